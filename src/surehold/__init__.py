@@ -1,0 +1,1 @@
+"""surehold: find, in few trials, the optimum that still holds when the input shakes."""

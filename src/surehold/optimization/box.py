@@ -1,0 +1,130 @@
+"""The search space: named bounds in the user's units, and the map to the unit cube in which the optimizer works."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.errors import InputError
+
+__all__ = ["Box"]
+
+
+class Box:
+    """Named bounds; the order of the names is the order of the coordinates.
+
+    Parameters
+    ----------
+    bounds
+        `{name: (lower, upper)}` with finite `lower < upper`, in the user's units.
+
+    Attributes
+    ----------
+    names : tuple of str, length d
+    lower, upper : (d,) float64, read-only, the user's units
+
+    Raises
+    ------
+    InputError
+        If there is no variable, a name is not a non-empty string, or bounds are reversed, equal or not finite.
+
+    Examples
+    --------
+    >>> box = Box({"dx": (-0.05, 0.05), "dy": (-0.03, 0.03)})
+    >>> box.to_unit([0.0, 0.03])
+    array([0.5, 1. ])
+    """
+
+    def __init__(self, bounds: Mapping[str, tuple[float, float]]):
+        if not isinstance(bounds, Mapping) or len(bounds) == 0:
+            raise InputError(
+                f"bounds are {bounds!r}; give a mapping such as {{'dx': (-0.05, 0.05)}} of one or more names."
+            )
+        pairs = []
+        for name, pair in bounds.items():
+            if not isinstance(name, str) or not name:
+                raise InputError(f"variable name {name!r} is not a non-empty string; name each variable, such as 'dx'.")
+            try:
+                lower, upper = (float(value) for value in pair)
+            except (TypeError, ValueError):
+                raise InputError(f"bounds of '{name}' are {pair!r}; give two numbers (lower, upper).") from None
+            if not (np.isfinite(lower) and np.isfinite(upper)):
+                raise InputError(f"bounds of '{name}' are ({lower}, {upper}); both must be finite numbers.")
+            if not lower < upper or not np.isfinite(upper - lower):
+                raise InputError(
+                    f"bounds of '{name}' are ({lower}, {upper}); lower must be smaller than upper: swap or widen them."
+                )
+            pairs.append((lower, upper))
+        self.names: Final[tuple[str, ...]] = tuple(bounds)
+        self.lower: Final[NDArray[np.float64]] = np.array([pair[0] for pair in pairs])
+        self.upper: Final[NDArray[np.float64]] = np.array([pair[1] for pair in pairs])
+        self.lower.flags.writeable = False
+        self.upper.flags.writeable = False
+
+    @classmethod
+    def unit(cls, dimension: int) -> "Box":
+        """Return the unit cube with variables `x1` ... `xd`."""
+        return cls({f"x{i + 1}": (0.0, 1.0) for i in range(dimension)})
+
+    @property
+    def dimension(self) -> int:
+        """Number of variables d."""
+        return len(self.names)
+
+    @property
+    def widths(self) -> NDArray[np.float64]:
+        """`upper - lower`, shape (d,)."""
+        return self.upper - self.lower
+
+    def to_unit(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Map points (..., d) from the user's units to the unit cube."""
+        return (self._points(x) - self.lower) / self.widths
+
+    def from_unit(self, u: ArrayLike) -> NDArray[np.float64]:
+        """Map points (..., d) of the unit cube to the user's units; cube points never leave the box by rounding."""
+        u = self._points(u)
+        x = self.lower + u * self.widths
+        inside = (u >= 0.0) & (u <= 1.0)
+        return np.where(inside, np.clip(x, self.lower, self.upper), x)
+
+    def contains(self, x: ArrayLike, tolerance: float = 1e-9) -> bool:
+        """Tell whether every point of x (..., d) lies in the box, up to `tolerance` box widths of rounding."""
+        slack = tolerance * self.widths
+        x = self._points(x)
+        return bool(np.all((x >= self.lower - slack) & (x <= self.upper + slack)))
+
+    def as_dict(self, x: ArrayLike) -> dict[str, float]:
+        """Return one point (d,) as `{name: value}`."""
+        return dict(zip(self.names, self._points(x).tolist(), strict=True))
+
+    def _points(self, x: ArrayLike) -> NDArray[np.float64]:
+        try:
+            points = np.asarray(x, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"point {x!r} is not numeric; give {self.dimension} numbers ({', '.join(self.names)})."
+            ) from None
+        if points.ndim == 0 or points.shape[-1] != self.dimension:
+            raise InputError(
+                f"point of shape {points.shape} does not fit; the last axis must have {self.dimension} "
+                f"entries ({', '.join(self.names)})."
+            )
+        return points
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Box)
+            and self.names == other.names
+            and np.array_equal(self.lower, other.lower)
+            and np.array_equal(self.upper, other.upper)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.names, self.lower.tobytes(), self.upper.tobytes()))
+
+    def __repr__(self) -> str:
+        inner = ", ".join(
+            f"{n!r}: ({lo:g}, {up:g})" for n, lo, up in zip(self.names, self.lower, self.upper, strict=True)
+        )
+        return f"Box({{{inner}}})"
