@@ -1,0 +1,309 @@
+"""Log posterior density of Gaussian-process hyperparameters, weighted over blocks of data (compiled).
+
+Legend (the thesis' symbols in brackets)
+    X, y     inputs (n, d) in the unit cube, outputs (n,)
+    theta    hyperparameters (p,): log l_1 .. log l_d, then log s2 if learnt, then log v if learnt
+    l        length-scales (d,)
+    s2       signal variance                                        [sigma_p, used as a variance]
+    v        observation-noise variance, common to all observations
+    noise    known observation-noise variance of each observation (n,)
+    ratio    nugget as a fraction of the signal variance            [sigma_n, used as a ratio]
+    m2       prior variance of the constant mean, which is integrated out; 0 is a zero mean
+    A        covariance of the data: s2 (C + ratio I) + m2 11' + diag(noise) + v I, C the correlation matrix
+    L        lower Cholesky factor of A
+    blocks   slices of the observations, each an independent process with the same theta; block b has weight w_b  (3.11)
+
+    log p(y | X, theta) = -1/2 y' A^-1 y - log|L| - n/2 log 2 pi                        thesis (3.3); GPML algorithm 2.1
+    log posterior       = sum_b w_b log p(y_b | X_b, theta) + log prior(theta),  prior: independent normals on theta
+"""
+
+from math import exp, inf, log, pi, sqrt
+from typing import Final, NamedTuple
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import NDArray
+
+from surehold.optimization.kernels import correlation_and_factor, self_correlation
+
+__all__ = [
+    "Evidence",
+    "cholesky",
+    "log_posterior",
+    "log_posterior_and_gradient",
+    "solve_lower",
+    "solve_lower_transposed",
+]
+
+_LOG_2PI: Final = log(2.0 * pi)
+_LARGEST: Final = 60.0  # |theta| beyond this is outside every useful scale and would overflow
+_PANEL: Final = 96  # columns a panel of the blocked factorization; below twice this, plain loops are as fast as LAPACK
+
+
+class Evidence(NamedTuple):
+    """What the density of the hyperparameters depends on; plain arrays and numbers, in this order, for compiled code."""
+
+    X: NDArray[np.float64]
+    """inputs, (n, d), C-contiguous"""
+    y: NDArray[np.float64]
+    """outputs, (n,)"""
+    noise: NDArray[np.float64]
+    """known observation-noise variances, (n,)"""
+    offsets: NDArray[np.int64]
+    """block b is the observations offsets[b] : offsets[b + 1], (b + 1,)"""
+    weights: NDArray[np.float64]
+    """weight of each block, (b,)"""
+    prior_mean: NDArray[np.float64]
+    """mean of the normal prior of each hyperparameter, (p,)"""
+    prior_deviation: NDArray[np.float64]
+    """its standard deviation, (p,)"""
+    signal_variance: float
+    """s2 where it is not learnt"""
+    ratio: float
+    """nugget as a fraction of s2"""
+    mean_variance: float
+    """prior variance of the constant mean"""
+    kernel: int
+    """number of the kernel"""
+    learn_signal: bool
+    """whether theta holds log s2"""
+    learn_noise: bool
+    """whether theta ends with log v"""
+
+
+EVIDENCE_TYPE: Final = types.NamedTuple(
+    (
+        types.float64[:, ::1],
+        types.float64[::1],
+        types.float64[::1],
+        types.int64[::1],
+        types.float64[::1],
+        types.float64[::1],
+        types.float64[::1],
+        types.float64,
+        types.float64,
+        types.float64,
+        types.int64,
+        types.boolean,
+        types.boolean,
+    ),
+    Evidence,
+)
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _cholesky_block(A, start, stop):
+    for j in range(start, stop):
+        t = 0.0
+        for k in range(start, j):
+            t += A[j, k] * A[j, k]
+        pivot = A[j, j] - t
+        if not pivot > 0.0:
+            return False
+        A[j, j] = sqrt(pivot)
+        inverse = 1.0 / A[j, j]
+        for i in range(j + 1, stop):
+            t = 0.0
+            for k in range(start, j):
+                t += A[i, k] * A[j, k]
+            A[i, j] = (A[i, j] - t) * inverse
+    return True
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def cholesky(A):
+    """Overwrite the lower triangle of A (n, n) with its Cholesky factor; False if A is not positive definite."""
+    n = A.shape[0]
+    if n <= 2 * _PANEL:
+        return _cholesky_block(A, 0, n)
+    for start in range(0, n, _PANEL):
+        stop = min(start + _PANEL, n)
+        if not _cholesky_block(A, start, stop):
+            return False
+        for i in range(stop, n):
+            for j in range(start, stop):
+                t = 0.0
+                for k in range(start, j):
+                    t += A[i, k] * A[j, k]
+                A[i, j] = (A[i, j] - t) / A[j, j]
+        below = np.ascontiguousarray(A[stop:, start:stop])
+        for first in range(stop, n, 4 * _PANEL):  # row slabs: only the lower triangle is updated, by matrix products
+            last = min(first + 4 * _PANEL, n)
+            A[first:last, stop:last] -= np.dot(below[first - stop : last - stop], below[: last - stop].T)
+    return True
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def solve_lower(L, b):
+    """Overwrite b (n,) with L^-1 b."""
+    for i in range(b.size):
+        t = 0.0
+        for k in range(i):
+            t += L[i, k] * b[k]
+        b[i] = (b[i] - t) / L[i, i]
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def solve_lower_transposed(L, b):
+    """Overwrite b (n,) with L'^-1 b."""
+    for i in range(b.size - 1, -1, -1):
+        b[i] /= L[i, i]
+        t = b[i]
+        for k in range(i):
+            b[k] -= L[i, k] * t
+
+
+@njit(cache=True)
+def unpack(theta, evidence):
+    """Return (s2, v) of theta."""
+    d = evidence.X.shape[1]
+    s2, v = evidence.signal_variance, 0.0
+    position = d
+    if evidence.learn_signal:
+        s2 = exp(theta[position])
+        position += 1
+    if evidence.learn_noise:
+        v = exp(theta[position])
+    return s2, v
+
+
+@njit(cache=True)
+def data_covariance(X, noise, inverse_l, s2, v, ratio, mean_variance, kernel, A):
+    """Fill the lower triangle of A (n, n) with s2 (C + ratio I) + m2 11' + diag(noise) + v I."""
+    n = X.shape[0]
+    self_correlation(kernel, X, inverse_l, A)
+    for i in range(n):
+        for j in range(i):
+            A[i, j] = A[i, j] * s2 + mean_variance
+        A[i, i] = s2 * (1.0 + ratio) + mean_variance + noise[i] + v
+
+
+@njit(cache=True)
+def _log_prior(theta, evidence):
+    value = 0.0
+    for i in range(theta.size):
+        if not abs(theta[i]) < _LARGEST:
+            return -inf
+        z = (theta[i] - evidence.prior_mean[i]) / evidence.prior_deviation[i]
+        value -= 0.5 * z * z + log(evidence.prior_deviation[i]) + 0.5 * _LOG_2PI
+    return value
+
+
+@njit(types.float64(types.float64[::1], EVIDENCE_TYPE), cache=True)
+def log_posterior(theta, evidence):
+    """Return the log posterior density of theta (p,), up to no constant; -inf where A is not positive definite."""
+    value = _log_prior(theta, evidence)
+    if value == -inf:
+        return value
+    d = evidence.X.shape[1]
+    inverse_l = np.exp(-theta[:d])
+    s2, v = unpack(theta, evidence)
+    for b in range(evidence.weights.size):
+        start, stop = evidence.offsets[b], evidence.offsets[b + 1]
+        n = stop - start
+        if n == 0 or evidence.weights[b] == 0.0:
+            continue
+        A = np.empty((n, n))
+        data_covariance(
+            evidence.X[start:stop],
+            evidence.noise[start:stop],
+            inverse_l,
+            s2,
+            v,
+            evidence.ratio,
+            evidence.mean_variance,
+            evidence.kernel,
+            A,
+        )
+        if not cholesky(A):
+            return -inf
+        z = evidence.y[start:stop].copy()
+        solve_lower(A, z)
+        total = 0.5 * n * _LOG_2PI
+        for i in range(n):
+            total += 0.5 * z[i] * z[i] + log(A[i, i])
+        value -= evidence.weights[b] * total
+    return value
+
+
+@njit(cache=True)
+def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, gradient):
+    """Return log p of one block and add its derivatives to `gradient` (d + 2,): log l, log s2, log v."""
+    n, d = X.shape
+    C = np.empty((n, n))
+    factor = np.empty((n, n))
+    correlation_and_factor(kernel, X, X, inverse_l, C, factor)
+    L = s2 * C + mean_variance
+    for i in range(n):
+        L[i, i] = s2 * (1.0 + ratio) + mean_variance + noise[i] + v
+    if not cholesky(L):
+        return -inf
+    inverse = np.zeros((n, n))  # row j holds L^-1 e_j, so inverse' is L^-1
+    for j in range(n):
+        inverse[j, j] = 1.0 / L[j, j]
+        for i in range(j + 1, n):
+            t = 0.0
+            for k in range(j, i):
+                t += L[i, k] * inverse[j, k]
+            inverse[j, i] = -t / L[i, i]
+    A_inverse = np.dot(inverse, inverse.T)
+    alpha = np.dot(A_inverse, y)
+    value = -0.5 * n * _LOG_2PI
+    for i in range(n):
+        value -= 0.5 * y[i] * alpha[i] + log(L[i, i])
+    for i in range(n):  # 1/2 tr((alpha alpha' - A^-1) dA/dtheta), GPML (5.9)
+        for j in range(i):
+            w = (alpha[i] * alpha[j] - A_inverse[i, j]) * s2  # the two symmetric entries together
+            for k in range(d):
+                t = (X[i, k] - X[j, k]) * inverse_l[k]
+                gradient[k] += w * factor[i, j] * t * t
+            gradient[d] += w * C[i, j]
+        w = 0.5 * (alpha[i] * alpha[i] - A_inverse[i, i])
+        gradient[d] += w * s2 * (1.0 + ratio)
+        gradient[d + 1] += w * v
+    return value
+
+
+@njit(cache=True)
+def log_posterior_and_gradient(theta, evidence):
+    """Return the log posterior density of theta (p,) and its gradient (p,); (-inf, 0) where A is not positive definite."""
+    gradient = np.zeros(theta.size)
+    value = _log_prior(theta, evidence)
+    if value == -inf:
+        return value, gradient
+    d = evidence.X.shape[1]
+    inverse_l = np.exp(-theta[:d])
+    s2, v = unpack(theta, evidence)
+    full = np.zeros(d + 2)
+    for b in range(evidence.weights.size):
+        start, stop = evidence.offsets[b], evidence.offsets[b + 1]
+        weight = evidence.weights[b]
+        if stop == start or weight == 0.0:
+            continue
+        part = np.zeros(d + 2)
+        block = _block_gradient(
+            evidence.X[start:stop],
+            evidence.y[start:stop],
+            evidence.noise[start:stop],
+            inverse_l,
+            s2,
+            v,
+            evidence.ratio,
+            evidence.mean_variance,
+            evidence.kernel,
+            part,
+        )
+        if block == -inf:
+            return -inf, gradient
+        value += weight * block
+        full += weight * part
+    gradient[:d] = full[:d]
+    position = d
+    if evidence.learn_signal:
+        gradient[position] = full[d]
+        position += 1
+    if evidence.learn_noise:
+        gradient[position] = full[d + 1]
+    for i in range(theta.size):
+        gradient[i] -= (theta[i] - evidence.prior_mean[i]) / evidence.prior_deviation[i] ** 2
+    return value, gradient

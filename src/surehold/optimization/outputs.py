@@ -1,0 +1,66 @@
+"""Outputs on a common scale: what the surrogate learns from is (y - shift) / scale."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError
+
+__all__ = ["Standardization"]
+
+_FLAT = 1e-12  # a spread below this fraction of the largest |y| is rounding, not information
+
+
+class Standardization(NamedTuple):
+    """Affine map of the outputs."""
+
+    shift: float
+    """subtracted, in the outputs' units"""
+    scale: float
+    """divided by, positive, in the outputs' units"""
+    flat: bool
+    """whether the outputs do not differ, so that their scale is unknown"""
+
+    @classmethod
+    def identity(cls, y: NDArray[np.float64]) -> "Standardization":
+        """Return the map that leaves outputs y (n,) as they are."""
+        return cls(0.0, 1.0, _is_flat(y))
+
+    @classmethod
+    def of(cls, y: NDArray[np.float64], output_range: tuple[float, float] | None = None) -> "Standardization":
+        """Return the map to zero mean and unit standard deviation of y (n,).
+
+        Outputs that do not differ say nothing about the scale: they are only centered, and `flat` says so. A stated
+        `output_range` (lowest and highest value to expect) sets the scale instead: the range counts as four
+        standard deviations, or the data's own spread where that is larger.
+        """
+        flat = _is_flat(y)
+        shift = float(y.mean()) if len(y) else 0.0
+        spread = 0.0 if flat else float(y.std())
+        if not np.isfinite(spread):  # squares of outputs near the largest float overflow
+            spread = float(np.abs(y - shift).max())
+        if output_range is not None:
+            return cls(shift, max((output_range[1] - output_range[0]) / 4.0, spread), flat)
+        return cls(shift, spread if spread > 0.0 else 1.0, flat)
+
+    def apply(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return standardized outputs."""
+        return (y - self.shift) / self.scale
+
+
+def checked_range(output_range: tuple[float, float] | None) -> tuple[float, float] | None:
+    """Return a stated output range, or raise InputError if it is not two finite numbers, the lower one first."""
+    if output_range is None:
+        return None
+    try:
+        lower, upper = (float(value) for value in output_range)
+    except (TypeError, ValueError):
+        raise InputError(f"output_range is {output_range!r}; give (lowest, highest) value to expect.") from None
+    if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
+        raise InputError(f"output_range is ({lower}, {upper}); give two finite numbers, the lower one first.")
+    return lower, upper
+
+
+def _is_flat(y: NDArray[np.float64]) -> bool:
+    return len(y) < 2 or float(np.ptp(y)) <= _FLAT * float(np.abs(y).max())

@@ -1,0 +1,25 @@
+"""One BLAS thread inside a process; parallelism is across trials and runs.
+
+The matrices here are small: a second thread costs more in waking than it saves, and many workers on one machine would
+fight for cores.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+
+from threadpoolctl import ThreadpoolController
+
+__all__ = ["single_threaded"]
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    return ThreadpoolController()  # scans the loaded libraries, once
+
+
+@contextmanager
+def single_threaded() -> Iterator[None]:
+    """Limit linear algebra to one thread inside a `with` block."""
+    with _controller().limit(limits=1, user_api="blas"):
+        yield
