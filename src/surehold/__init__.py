@@ -1,1 +1,63 @@
-"""surehold: find, in few trials, the optimum that still holds when the input shakes."""
+"""surehold: find, in few trials, the optimum that still holds when the input shakes.
+
+The public names below are imported when they are first used, so that `import surehold` stays quick.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from surehold import grasping, problems
+    from surehold.errors import InputError, SureholdError
+    from surehold.optimization.box import Box
+    from surehold.optimization.gaussian_process import GaussianProcess
+    from surehold.optimization.input_noise import InputNoise
+    from surehold.optimization.maximization import Result, Trial, maximize
+    from surehold.optimization.optimizer import Optimizer, Recommendation
+    from surehold.optimization.robustness import sigma_points
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Box",
+    "GaussianProcess",
+    "InputError",
+    "InputNoise",
+    "Optimizer",
+    "Recommendation",
+    "Result",
+    "SureholdError",
+    "Trial",
+    "grasping",
+    "maximize",
+    "problems",
+    "sigma_points",
+]
+
+_HOMES = {
+    "Box": "optimization.box",
+    "GaussianProcess": "optimization.gaussian_process",
+    "InputError": "errors",
+    "InputNoise": "optimization.input_noise",
+    "Optimizer": "optimization.optimizer",
+    "Recommendation": "optimization.optimizer",
+    "Result": "optimization.maximization",
+    "SureholdError": "errors",
+    "Trial": "optimization.maximization",
+    "maximize": "optimization.maximization",
+    "sigma_points": "optimization.robustness",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("grasping", "problems"):
+        return import_module(f"surehold.{name}")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'surehold' has no attribute {name!r}; it has {', '.join(__all__)}")
+    value = getattr(import_module(f"surehold.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

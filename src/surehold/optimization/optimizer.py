@@ -112,7 +112,7 @@ class Optimizer:
         self.box: Final = box
         self.input_noise: Final = input_noise
         self.seed: Final = _count("seed", seed, 0)
-        self.n_initial: Final = _count("n_initial", max(6, 5 * box.dimension) if n_initial is None else n_initial, 1)
+        self.n_initial: Final = _count("n_initial", self.default_n_initial(box) if n_initial is None else n_initial, 1)
         self._thesis = None if preset is None else thesis_preset(preset)
         self._noisy = noise != "none" and noise != 0.0
         if isinstance(surrogate, str):
@@ -146,6 +146,11 @@ class Optimizer:
         self._values: list[float] = []
         self._pending: list[NDArray[np.float64]] = []
         self._cache: tuple[int, Posterior] | None = None
+
+    @staticmethod
+    def default_n_initial(box: Box) -> int:
+        """Return the size of the initial design where none is given: 5 a variable, at least 6."""
+        return max(6, 5 * box.dimension)
 
     # --- trials -------------------------------------------------------------------------------------------------
 
