@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: grasp test check bench docs clean
+.PHONY: grasp test check bench clean
 
 grasp: .venv/.installed
 	$(BIN)/surehold grasp mug

@@ -39,9 +39,9 @@ class Value(NamedTuple):
 def expected_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, margin: float = 0.0) -> Value:
     """Return (mean - best - margin) Phi(z) + std phi(z), thesis (3.15), (3.16); max(mean - best - margin, 0) at std 0."""
     mean, std = np.asarray(mean, dtype=np.float64), np.asarray(std, dtype=np.float64)
-    gain = mean - best - margin
+    gain = mean - np.asarray(best) - margin
     z = gain / np.maximum(std, _SMALLEST)
-    density = np.exp(-0.5 * np.square(np.clip(z, -40.0, 40.0)) - _LOG_SQRT_2PI)
+    density = _density(z)
     probability = ndtr(z)
     # For z below -1 the two terms nearly cancel; the scaled complementary error function does not.
     low = z < -1.0
@@ -55,7 +55,7 @@ def log_expected_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, m
     log EI = log std + log h(z), h(z) = phi(z) + z Phi(z), with the asymptotic branch of Ament et al. 2023.
     """
     std = np.maximum(np.asarray(std, dtype=np.float64), _SMALLEST)
-    z = (np.asarray(mean, dtype=np.float64) - best - margin) / std
+    z = (np.asarray(mean, dtype=np.float64) - np.asarray(best) - margin) / std
     # log h: below -1 the sum cancels; far below, 1 - |z| sqrt(pi/2) erfcx is rounding and its limit 1 / z^2 holds.
     low = z < -1.0
     z_low = np.where(low, z, -1.0)
@@ -76,8 +76,8 @@ def log_expected_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, m
 def probability_of_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, margin: float = 0.0) -> Value:
     """Return Phi(z), thesis table 2.1; 0 or 1 at std 0."""
     std = np.maximum(np.asarray(std, dtype=np.float64), _SMALLEST)
-    z = (np.asarray(mean, dtype=np.float64) - best - margin) / std
-    density = np.exp(-0.5 * np.square(np.clip(z, -40.0, 40.0)) - _LOG_SQRT_2PI)
+    z = (np.asarray(mean, dtype=np.float64) - np.asarray(best) - margin) / std
+    density = _density(z)
     return Value(ndtr(z), density / std, -z * density / std)
 
 
@@ -85,6 +85,12 @@ def upper_confidence_bound(mean: ArrayLike, std: ArrayLike, kappa: float) -> Val
     """Return mean + kappa std, thesis table 2.1."""
     mean, std = np.asarray(mean, dtype=np.float64), np.asarray(std, dtype=np.float64)
     return Value(mean + kappa * std, np.ones_like(mean), np.full_like(std, kappa))
+
+
+def _density(z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the standard normal density, 0 far out without overflow on the way."""
+    bounded = np.clip(z, -40.0, 40.0)
+    return np.exp(-0.5 * bounded * bounded - _LOG_SQRT_2PI)
 
 
 def _mills_gap(z: NDArray[np.float64]) -> NDArray[np.float64]:

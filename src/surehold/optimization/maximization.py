@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,8 @@ from surehold.optimization.optimizer import Optimizer, Recommendation
 __all__ = ["Result", "Trial", "maximize"]
 
 
-class Trial(NamedTuple):
+@dataclass(frozen=True)
+class Trial:
     """One finished trial, as passed to the callback."""
 
     index: int

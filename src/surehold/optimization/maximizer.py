@@ -67,12 +67,12 @@ def direct(objective: Objective, dimension: int, incumbent: NDArray[np.float64],
 
     500 d evaluations, a tenth of them for the polish (spec of the thesis' programs). The local search is L-BFGS-B.
     """
-    from scipy.optimize import Bounds, direct
+    from scipy.optimize import direct
 
     budget = 500 * dimension
     found = direct(
         lambda u: -float(objective(u[None, :])[0]),
-        Bounds(np.zeros(dimension), np.ones(dimension)),
+        [(0.0, 1.0)] * dimension,
         maxfun=budget - budget // 10,
         maxiter=budget,
         vol_tol=0.0,
