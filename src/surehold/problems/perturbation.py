@@ -1,0 +1,101 @@
+"""Score an input by what happens around it: re-query the problem where an imprecise execution would end up."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+from surehold.optimization.input_noise import InputNoise
+from surehold.problems.problem import Problem, checked_points
+
+__all__ = ["RobustScore", "perturbed_points", "robust_score"]
+
+
+@dataclass(frozen=True)
+class RobustScore:
+    """Outcome of n perturbed re-queries of one input. They only score; they are no part of a budget."""
+
+    mean: float  #: mean of `values`; NaN if every re-query failed
+    std: float  #: sample standard deviation of `values` (divisor n - 1); 0 for a single value
+    worst: float  #: lowest of `values`
+    values: NDArray[np.float64]  #: (n - n_failed,) outcomes, in the order of `points` without the failed ones
+    points: NDArray[np.float64]  #: (n, d) inputs that were queried, in the units of the box
+    n_failed: int  #: re-queries that raised or gave no finite number
+
+    def quantile(self, level: float) -> float:
+        """Return the value below which the share `level` (0 to 1) of the outcomes lies.
+
+        Raises
+        ------
+        InputError
+            If level is outside [0, 1].
+        """
+        if not 0.0 <= level <= 1.0:
+            raise InputError(f"quantile level is {level!r}; give a share from 0 to 1, such as 0.05.")
+        return float(np.quantile(self.values, level)) if self.values.size else float("nan")
+
+
+def perturbed_points(
+    x: ArrayLike, box: Box, noise: InputNoise, n: int = 100, seed: int | np.random.Generator = 0
+) -> NDArray[np.float64]:
+    """Draw n inputs x + N(0, S) around x (d,) -> (n, d), in the units of the box.
+
+    A coordinate that would leave the box keeps its noise-free value (the thesis' rule). The draw depends on
+    (S, n, seed) only, so two inputs that are compared are shaken in the same way.
+
+    Raises
+    ------
+    InputError
+        If n is not a positive integer, or x lies outside the box.
+    """
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+        raise InputError(f"number of perturbations is {n!r}; give an integer of 1 or more.")
+    center, single = checked_points(x, box)
+    if not single:
+        raise InputError(f"x has shape {center.shape}; score one point ({box.dimension},) at a time.")
+    if not box.contains(center[0]):
+        raise InputError(f"x = {center[0].tolist()} lies outside {box!r}; score a point of the box.")
+    rng = np.random.default_rng(seed)
+    unit = box.to_unit(center[0])
+    reached = unit + rng.standard_normal((int(n), box.dimension)) @ _root(noise.unit_covariance(box)).T
+    outside = (reached < 0.0) | (reached > 1.0)
+    return np.where(outside, center[0], box.from_unit(np.clip(reached, 0.0, 1.0)))
+
+
+def robust_score(
+    problem: Problem, x: ArrayLike, noise: InputNoise, n: int = 100, seed: int | np.random.Generator = 0
+) -> RobustScore:
+    """Query `problem` at n perturbations of x (d,) and return mean, standard deviation and worst outcome.
+
+    A re-query that raises an exception or gives no finite number is counted in `n_failed` and left out.
+
+    Raises
+    ------
+    InputError
+        If n is not a positive integer, x lies outside the box, or the noise does not fit the box.
+    """
+    points = perturbed_points(x, problem.box, noise, n, seed)
+    outcomes = np.array([_outcome(problem, point) for point in points])
+    values = outcomes[np.isfinite(outcomes)]
+    n_failed = int(outcomes.size - values.size)
+    if values.size == 0:
+        return RobustScore(np.nan, np.nan, np.nan, values, points, n_failed)
+    std = float(np.std(values, ddof=1)) if values.size > 1 else 0.0
+    return RobustScore(float(np.mean(values)), std, float(np.min(values)), values, points, n_failed)
+
+
+def _outcome(problem: Problem, point: NDArray[np.float64]) -> float:
+    try:
+        return float(problem(point))
+    except Exception:  # a user's function may raise anything; the failure is counted, the score goes on
+        return float("nan")
+
+
+def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return L (d, d) with L L' = covariance; variables without noise have zero rows."""
+    shaken = np.flatnonzero(np.diag(covariance) > 0.0)
+    root = np.zeros_like(covariance)
+    root[np.ix_(shaken, shaken)] = np.linalg.cholesky(covariance[np.ix_(shaken, shaken)])
+    return root

@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+from surehold.optimization.input_noise import InputNoise
+from surehold.problems import GM, RKHS, Function, perturbed_points, robust_score
+
+
+def test_score_converges_to_the_closed_form():
+    p, noise = GM(), InputNoise.unit(0.05)
+    x = [0.45, 0.48]
+    score = robust_score(p, x, noise, n=20_000)
+    standard_error = p.standard_deviation(x, noise) / np.sqrt(20_000)
+    assert score.mean == pytest.approx(p.expectation(x, noise), abs=4 * standard_error)
+    assert score.std == pytest.approx(p.standard_deviation(x, noise), rel=0.03)
+
+
+def test_score_is_what_it_says():
+    p = RKHS()
+    score = robust_score(p, [0.0776], InputNoise.unit(0.01), n=50, seed=3)
+    np.testing.assert_array_equal(score.values, p(score.points))
+    assert score.points.shape == (50, 1)
+    assert score.mean == np.mean(score.values)
+    assert score.std == np.std(score.values, ddof=1)
+    assert score.worst == score.values.min() == score.quantile(0.0)
+    assert score.n_failed == 0
+    again = robust_score(p, [0.0776], InputNoise.unit(0.01), n=50, seed=3)
+    np.testing.assert_array_equal(score.values, again.values)
+
+
+def test_a_coordinate_that_would_leave_the_box_keeps_its_value():
+    box = Box({"a": (-1.0, 3.0), "b": (0.0, 10.0)})
+    x = np.array([3.0, 5.0])
+    points = perturbed_points(x, box, InputNoise({"a": 0.4, "b": 0.5}), n=4000)
+    assert box.contains(points, tolerance=0.0)
+    kept = points[:, 0] == 3.0
+    assert 0.45 < kept.mean() < 0.55
+    assert np.all(points[:, 1] != 5.0), "the other coordinate still moves"
+
+
+def test_full_covariance_and_exact_variables():
+    box = Box({"a": (0.0, 2.0), "b": (0.0, 2.0)})
+    covariance = np.array([[0.01, 0.008], [0.008, 0.02]])
+    points = perturbed_points([1.0, 1.0], box, InputNoise(covariance=covariance), n=40_000)
+    np.testing.assert_allclose(np.cov(points.T), covariance, rtol=0.05)
+    exact = perturbed_points([1.0, 1.0], box, InputNoise({"a": 0.1, "b": 0.0}), n=50)
+    assert np.all(exact[:, 1] == 1.0)
+    assert np.std(exact[:, 0]) == pytest.approx(0.1, rel=0.3)
+
+
+def test_failures_are_counted_not_scored():
+    def half(x):
+        if x[0] > 0.5:
+            raise RuntimeError("fell off the table")
+        return np.nan if x[0] < 0.45 else 1.0
+
+    score = robust_score(Function(half, Box.unit(1)), [0.5], InputNoise.unit(0.05), n=200)
+    assert 120 < score.n_failed < 160
+    assert score.mean == score.worst == 1.0
+    assert score.values.size + score.n_failed == 200
+
+    def never(x):
+        raise RuntimeError
+
+    lost = robust_score(Function(never, Box.unit(1)), [0.5], InputNoise.unit(0.05), n=3)
+    assert lost.n_failed == 3
+    assert np.isnan(lost.mean)
+    assert np.isnan(lost.quantile(0.5))
+
+
+@pytest.mark.parametrize("n", [0, -1, 2.5, True])
+def test_bad_counts(n):
+    with pytest.raises(InputError, match="integer of 1 or more"):
+        robust_score(RKHS(), [0.5], InputNoise.unit(0.01), n=n)
+
+
+def test_bad_points():
+    noise = InputNoise.unit(0.01)
+    with pytest.raises(InputError, match="outside"):
+        robust_score(RKHS(), [1.5], noise)
+    with pytest.raises(InputError, match="one point"):
+        robust_score(RKHS(), [[0.5], [0.6]], noise)
+    with pytest.raises(InputError, match="level"):
+        robust_score(RKHS(), [0.5], noise, n=5).quantile(1.5)
