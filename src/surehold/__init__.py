@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from surehold.optimization.input_noise import InputNoise
     from surehold.optimization.maximization import Result, Trial, maximize
     from surehold.optimization.optimizer import Optimizer, Recommendation
-    from surehold.optimization.robustness import sigma_points
+    from surehold.optimization.quadratures import sigma_points
 
 __version__ = "0.1.0"
 
@@ -45,7 +45,7 @@ _HOMES = {
     "SureholdError": "errors",
     "Trial": "optimization.maximization",
     "maximize": "optimization.maximization",
-    "sigma_points": "optimization.robustness",
+    "sigma_points": "optimization.quadratures",
 }
 
 

@@ -21,7 +21,7 @@ from surehold.optimization.criteria import (
     probability_of_improvement,
     upper_confidence_bound,
 )
-from surehold.optimization.robustness import Quadrature
+from surehold.optimization.quadratures import Quadrature
 from surehold.optimization.surrogate import Moments, Posterior
 
 __all__ = ["CRITERIA", "Acquisition", "CriterionName", "criterion_name", "where_to_look"]

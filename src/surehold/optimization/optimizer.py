@@ -19,7 +19,7 @@ from surehold.optimization.designs import design as initial_design
 from surehold.optimization.gaussian_process import GaussianProcess
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.presets import thesis_preset
-from surehold.optimization.robustness import Quadrature, exact, gaussian_sample, sigma_points
+from surehold.optimization.quadratures import exact, quasi_monte_carlo, sigma_points
 from surehold.optimization.surrogate import Posterior, Surrogate, mixture
 from surehold.optimization.threads import single_threaded
 
@@ -276,7 +276,7 @@ class Optimizer:
             posterior = self._posterior()
             index = int(np.argmax(self._outcomes(posterior)))
             u = self._inputs[self._successful][index]
-            spread = gaussian_sample(self._covariance)
+            spread = quasi_monte_carlo(self._covariance, 7)
             moments = posterior.moments(u + spread.offsets)
             mean, variance = mixture(moments)
             quantile = _mixture_quantile(moments.mean.ravel(), np.sqrt(moments.variance).ravel(), _QUANTILE)
@@ -336,12 +336,12 @@ class Optimizer:
         """Return the value to improve upon, on the criterion's scale, and the best tried inputs (a, d)."""
         tried = self._inputs[self._successful]
         observed = self.y[self._successful]
-        if self._thesis is not None:  # the original keeps the best observed value as incumbent inside UEI too
-            return float(observed.max()), tried[[int(observed.argmax())]]
         by_particle = posterior.average(tried, *self._quadrature).mean  # (m, n)
         outcomes = by_particle.mean(axis=0)
         order = np.argsort(-outcomes, kind="stable")
         anchors = tried[order[:_ANCHORS]]
+        if self._thesis is not None:  # the original improves upon the best observed value inside UEI too
+            return float(observed.max()), anchors
         if self._criterion.scale == "robust":
             return by_particle[:, order[:1]], anchors
         if self._criterion.scale == "exact" and not self._noisy:
