@@ -37,7 +37,10 @@ class Value(NamedTuple):
 
 
 def expected_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, margin: float = 0.0) -> Value:
-    """Return (mean - best - margin) Phi(z) + std phi(z), thesis (3.15), (3.16); max(mean - best - margin, 0) at std 0."""
+    """Return (mean - best - margin) Phi(z) + std phi(z), thesis (3.15), (3.16).
+
+    At a standard deviation of 0 that is max(mean - best - margin, 0).
+    """
     mean, std = np.asarray(mean, dtype=np.float64), np.asarray(std, dtype=np.float64)
     gain = mean - np.asarray(best) - margin
     z = gain / np.maximum(std, _SMALLEST)

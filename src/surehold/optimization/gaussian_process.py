@@ -8,8 +8,8 @@ Legend (the thesis' symbols in brackets)
     mean_j     k_j' A_j^-1 y                                                                   thesis (3.5)
     variance_j k_j(x, x) - k_j' A_j^-1 k_j                                                     thesis (3.6)
 
-A weighted sum of function values, sum_i w_i f(x + xi_i), is itself Gaussian under each particle: its covariance with the
-data is sum_i w_i k_j(x + xi_i, X) and its prior variance sum_ij w_i w_j k_j(xi_i, xi_j). With one offset of 0 that is
+A weighted sum of function values, sum_i w_i f(x + xi_i), is itself Gaussian under each particle: its covariance with
+the data is sum_i w_i k_j(x + xi_i, X) and its prior variance sum_ij w_i w_j k_j(xi_i, xi_j). With one offset of 0 that is
 f(x) itself, so one compiled function serves both.
 """
 

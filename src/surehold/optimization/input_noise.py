@@ -69,8 +69,8 @@ class InputNoise:
         if self._covariance is not None:
             if self._covariance.shape[0] != box.dimension:
                 raise InputError(
-                    f"input-noise covariance is {self._covariance.shape[0]} x {self._covariance.shape[0]}, but the box has "
-                    f"{box.dimension} variables ({', '.join(box.names)}); give a {box.dimension} x {box.dimension} matrix."
+                    f"input-noise covariance has {self._covariance.shape[0]} rows, but the box has {box.dimension} "
+                    f"variables ({', '.join(box.names)}); give a {box.dimension} x {box.dimension} matrix."
                 )
             return self._covariance / np.outer(box.widths, box.widths)
         deviations = self._deviations or {}

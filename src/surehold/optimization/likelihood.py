@@ -41,7 +41,7 @@ _PANEL: Final = 96  # columns a panel of the blocked factorization; below twice 
 
 
 class Evidence(NamedTuple):
-    """What the density of the hyperparameters depends on; plain arrays and numbers, in this order, for compiled code."""
+    """What the density of the hyperparameters depends on; plain arrays and numbers for compiled code."""
 
     X: NDArray[np.float64]
     """inputs, (n, d), C-contiguous"""
@@ -266,7 +266,7 @@ def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel,
 
 @njit(cache=True)
 def log_posterior_and_gradient(theta, evidence):
-    """Return the log posterior density of theta (p,) and its gradient (p,); (-inf, 0) where A is not positive definite."""
+    """Return the log posterior density of theta (p,) and its gradient (p,); -inf and 0 where A is not definite."""
     gradient = np.zeros(theta.size)
     value = _log_prior(theta, evidence)
     if value == -inf:

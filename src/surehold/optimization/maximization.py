@@ -111,7 +111,8 @@ def maximize(
     optimizer = Optimizer(box, **settings)
     if optimizer.n_initial > n_trials:
         raise InputError(
-            f"n_initial is {optimizer.n_initial}, but n_trials is {n_trials}; give at least as many trials as initial ones."
+            f"n_initial is {optimizer.n_initial}, but n_trials is {n_trials}; "
+            "give at least as many trials as initial ones."
         )
     trials: list[Trial] = []
     interrupted = False

@@ -1,4 +1,4 @@
-"""Weighted perturbations that stand for the input noise: unscented, central difference, Gauss-Hermite, quasi-Monte Carlo.
+"""Weighted perturbations that stand for the input noise: sigma points and other quadratures.
 
 Legend (the thesis' symbols in brackets)
     S        covariance of the input noise in the unit cube, (d, d)           [Sigma_x]
