@@ -8,8 +8,8 @@ Legend (the thesis' symbols in brackets)
     mean_j     k_j' A_j^-1 y                                                                   thesis (3.5)
     variance_j k_j(x, x) - k_j' A_j^-1 k_j                                                     thesis (3.6)
 
-A weighted sum of function values, sum_i w_i f(x + xi_i), is itself Gaussian under each particle: its covariance with
-the data is sum_i w_i k_j(x + xi_i, X) and its prior variance sum_ij w_i w_j k_j(xi_i, xi_j). With one offset of 0 that is
+A weighted sum of function values, sum_i w_i f(x + xi_i), is itself Gaussian under each particle: its covariance with the
+data is sum_i w_i k_j(x + xi_i, X) and its prior variance sum_ij w_i w_j k_j(xi_i, xi_j). With one offset of 0 that is
 f(x) itself, so one compiled function serves both.
 """
 
@@ -64,8 +64,12 @@ def _factorize(X, Y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, inve
 
 
 @njit(cache=True)
-def _average(Q, offsets, weights, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha, gradient):
-    """Return mean, variance (m, q) and their gradients (m, q, d) of the weighted sums at Q (q, d)."""
+def _average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha, gradient):
+    """Return mean, variance (m, q) and their gradients (m, q, d) of the weighted sums at Q (q, d).
+
+    offsets (b, s, d): the same perturbations for every query (b = 1) or its own for each (b = q); slopes (b, s, d):
+    derivative of each coordinate of query + offset by that coordinate of the query.
+    """
     m, n = alpha.shape
     q, d = Q.shape
     mean = np.empty((m, q))
@@ -75,23 +79,29 @@ def _average(Q, offsets, weights, X, inverse_l, s2, mean_variance, kernel, inver
     total = weights.sum()
     part = np.empty((n, q))
     factor = np.empty((n, q if gradient else 0))
-    own = np.empty((offsets.shape[0], offsets.shape[0]))
+    s = weights.size
+    own = np.empty((s, s))
+    own_factor = np.empty((s, s))
+    prior = np.empty(offsets.shape[0])
+    prior_gradient = np.zeros((offsets.shape[0], d))
+    last = offsets.shape[0] - 1
     shifted = np.empty((q, d))
     slope = np.zeros((d, n, q if gradient else 0))
     for j in range(m):
         K = np.zeros((n, q))
         slope[:] = 0.0
-        for w in range(weights.size):
+        for w in range(s):
             for i in range(q):
                 for k in range(d):
-                    shifted[i, k] = Q[i, k] + offsets[w, k]
+                    shifted[i, k] = Q[i, k] + offsets[min(i, last), w, k]
             if gradient:
                 correlation_and_factor(kernel, X, shifted, inverse_l[j], part, factor)
                 for k in range(d):
                     scale = -s2[j] * weights[w] * inverse_l[j, k] ** 2
                     for a in range(n):
                         for i in range(q):
-                            slope[k, a, i] += scale * factor[a, i] * (shifted[i, k] - X[a, k])
+                            t = shifted[i, k] - X[a, k]
+                            slope[k, a, i] += scale * factor[a, i] * t * slopes[min(i, last), w, k]
             else:
                 cross_correlation(kernel, X, shifted, inverse_l[j], part)
             scale = s2[j] * weights[w]
@@ -100,21 +110,32 @@ def _average(Q, offsets, weights, X, inverse_l, s2, mean_variance, kernel, inver
                     K[a, i] += scale * part[a, i]
         if mean_variance > 0.0:
             K += mean_variance * total
-        cross_correlation(kernel, offsets, offsets, inverse_l[j], own)
-        prior = 0.0
-        for a in range(weights.size):
-            for b in range(weights.size):
-                prior += weights[a] * weights[b] * (s2[j] * own[a, b] + mean_variance)
+        for b in range(offsets.shape[0]):
+            xi = offsets[b]
+            correlation_and_factor(kernel, xi, xi, inverse_l[j], own, own_factor)
+            prior[b] = 0.0
+            prior_gradient[b] = 0.0
+            for w in range(s):
+                for o in range(s):
+                    both = weights[w] * weights[o]
+                    prior[b] += both * (s2[j] * own[w, o] + mean_variance)
+                    if gradient:
+                        for k in range(d):
+                            t = (xi[w, k] - xi[o, k]) * (slopes[b, w, k] - slopes[b, o, k])
+                            prior_gradient[b, k] -= both * s2[j] * own_factor[w, o] * t * inverse_l[j, k] ** 2
         V = np.dot(inverse_L[j], K)
         for i in range(q):
             mean[j, i] = 0.0
-            variance[j, i] = prior
+            variance[j, i] = prior[min(i, last)]
         for a in range(n):
             for i in range(q):
                 mean[j, i] += alpha[j, a] * K[a, i]
                 variance[j, i] -= V[a, i] * V[a, i]
         if gradient:
             W = np.dot(inverse_L[j].T, V)
+            for i in range(q):
+                for k in range(d):
+                    variance_gradient[j, i, k] = prior_gradient[min(i, last), k]
             for k in range(d):
                 for a in range(n):
                     for i in range(q):
@@ -192,11 +213,18 @@ class GaussianProcessPosterior:
         offsets: NDArray[np.float64],
         weights: NDArray[np.float64],
         gradient: bool = False,
+        slopes: NDArray[np.float64] | None = None,
     ) -> Moments:
-        """Return the moments of sum_i weights[i] f(query + offsets[i]) for queries (q, d), offsets (s, d)."""
+        """Return the moments of sum_i weights[i] f(query + offsets[i]) for queries (q, d).
+
+        offsets are (s, d), or (q, s, d) where each query has its own; slopes, of the same shape and 1 by default, are
+        the derivatives of query + offset by the query, coordinate by coordinate.
+        """
+        shape = (-1, *offsets.shape[-2:])
         mean, variance, mean_gradient, variance_gradient = _average(
             np.ascontiguousarray(queries),
-            np.ascontiguousarray(offsets),
+            np.ascontiguousarray(offsets).reshape(shape),
+            np.ascontiguousarray(np.ones_like(offsets) if slopes is None else slopes).reshape(shape),
             np.ascontiguousarray(weights),
             self.evidence.X,
             self.hyperparameters.inverse_l,

@@ -51,8 +51,13 @@ class Posterior(Protocol):
         offsets: NDArray[np.float64],
         weights: NDArray[np.float64],
         gradient: bool = False,
+        slopes: NDArray[np.float64] | None = None,
     ) -> Moments:
-        """Return the moments of sum_i weights[i] f(query + offsets[i]) for each query."""
+        """Return the moments of sum_i weights[i] f(query + offsets[i]) for each query.
+
+        offsets are (s, d), or (q, s, d) where each query has its own; slopes, of the same shape and 1 by default, are
+        the derivatives of query + offset by the query, coordinate by coordinate (0 where a point is held at a border).
+        """
         ...
 
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
