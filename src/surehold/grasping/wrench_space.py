@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.nearest_facet import DONE, FLAT, OUTSIDE, TOLERANCE, expand_nearest, nearest_point
+from surehold.grasping.nearest_facet import DONE, FAILED, FLAT, SPENT, TOLERANCE, expand_nearest
 
 __all__ = [
     "InscribedBall",
@@ -47,7 +47,7 @@ __all__ = [
 
 Convention = Literal["normal_unit", "unit_magnitude"]
 CONVENTIONS = ("normal_unit", "unit_magnitude")
-MAX_FACETS = 1_000_000
+FACET_BUDGETS = (4096, 65_536, 1_048_576)  # memory for so many facets is tried in turn; grasps need some thousands
 MAX_WRENCHES = 65_535  # the compiled expansion packs four indices of wrenches into 64 bits
 
 _NO_CENTERS = np.zeros((0, 6))
@@ -198,15 +198,10 @@ def wrench_quality(
 
 def ball_radius(wrenches: NDArray[np.float64]) -> float:
     """Return epsilon of wrenches (m, 6), C-contiguous and finite; the fast path, nothing else is computed."""
-    if len(wrenches) <= MAX_WRENCHES:
-        if len(wrenches) < 7:
-            return 0.0
-        status, lower, upper, _, _, _ = expand_nearest(wrenches, _NO_CENTERS, _NO_AXES, 0.0, MAX_FACETS)
-        if status == DONE:
-            return float(upper) if lower > TOLERANCE * np.sqrt(np.max(np.sum(wrenches**2, axis=1))) else 0.0
-        if status in (FLAT, OUTSIDE):
-            return 0.0
-    return _ball_from_hull(wrenches)[0]
+    status, lower, upper, _, _, _ = _expand(wrenches)
+    if status == FAILED:
+        return _ball_from_hull(wrenches)[0]
+    return upper if status == DONE and lower > TOLERANCE * _largest(wrenches) else 0.0
 
 
 def inscribed_ball(wrenches: ArrayLike) -> InscribedBall:
@@ -215,27 +210,79 @@ def inscribed_ball(wrenches: ArrayLike) -> InscribedBall:
     Raises InputError if the wrenches are not finite or not of shape (m, 6).
     """
     w = np.ascontiguousarray(_array("wrenches", wrenches, (None, 6)))
-    nowhere = np.zeros(6)
-    if len(w) == 0:
-        return InscribedBall(0.0, 0.0, 0.0, nowhere, 0, 0, False)
-    status, lower, upper, normal, expansions, facets = FLAT, 0.0, 0.0, nowhere, 0, 0
-    fallback = len(w) > MAX_WRENCHES
-    if not fallback and len(w) >= 7:
-        status, lower, upper, normal, expansions, facets = expand_nearest(w, _NO_CENTERS, _NO_AXES, 0.0, MAX_FACETS)
-        fallback = status not in (DONE, FLAT, OUTSIDE)
+    status, lower, upper, normal, expansions, facets = _expand(w)
+    fallback = status == FAILED
     if fallback:
         upper, normal = _ball_from_hull(w)
         lower = upper
-        status = DONE if upper > 0.0 else OUTSIDE
-    x, scale = (nowhere, 0.0) if status == DONE else nearest_point(w, _NO_CENTERS, _NO_AXES)
-    if status == DONE:
-        scale = np.sqrt(np.max(np.sum(w**2, axis=1)))
-        if lower > TOLERANCE * scale:
-            return InscribedBall(float(upper), float(lower), float(upper), normal, expansions, facets, fallback)
-    distance = float(np.sqrt(np.sum(x**2)))
+    if status in (DONE, FAILED) and lower > TOLERANCE * _largest(w):
+        return InscribedBall(upper, lower, upper, normal, expansions, facets, fallback)
+    nearest = nearest_point(w) if len(w) else np.zeros(6)
+    distance = float(np.linalg.norm(nearest))
     if distance > 0.0:
-        normal = -x / distance
+        normal = -nearest / distance
     return InscribedBall(-distance if distance else 0.0, 0.0, 0.0, normal, expansions, facets, fallback)
+
+
+def nearest_point(wrenches: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the point of the convex hull of wrenches (m, k), m >= 1, nearest to the origin; exactly 0 if inside.
+
+    Wolfe 1976, "Finding the nearest point in a polytope": keep a corral of few wrenches whose convex hull holds the
+    point of their affine hull nearest to the origin; add the wrench that lies farthest towards the origin from
+    there; drop those
+    whose weight turns negative.
+    """
+    squares = np.sum(wrenches**2, axis=1)
+    tolerance = TOLERANCE * np.sqrt(squares.max())
+    corral = [int(np.argmin(squares))]
+    weights = np.ones(1)
+    x = wrenches[corral[0]]
+    for _ in range(1000):
+        length = np.sqrt(x @ x)
+        if length <= tolerance:
+            return np.zeros_like(x)
+        along = wrenches @ (x / length)
+        added = int(np.argmin(along))
+        if length - along[added] <= tolerance or added in corral:
+            break
+        corral.append(added)
+        weights = np.append(weights, 0.0)
+        while True:
+            q = wrenches[corral]
+            rest = np.linalg.lstsq((q[1:] - q[0]).T, -q[0], rcond=1e-13)[0]
+            target = np.concatenate(([1.0 - rest.sum()], rest))
+            falling = (target <= 1e-13) & (weights > target)
+            if not falling.any():
+                weights = target
+                break
+            step = np.min(weights[falling] / (weights[falling] - target[falling]))
+            weights = weights + step * (target - weights)
+            kept = weights > 1e-13
+            if kept.all() or not kept.any():
+                return x
+            corral = [i for i, keep in zip(corral, kept, strict=True) if keep]
+            weights = weights[kept]
+            if len(corral) == 1:
+                break
+        x = weights @ wrenches[corral]
+    return x
+
+
+def _expand(w: NDArray[np.float64]) -> tuple[int, float, float, NDArray[np.float64], int, int]:
+    """Run `expand_nearest` on wrenches (m, 6) with the memory it needs; FAILED means: use the full hull."""
+    if len(w) < 7:
+        return FLAT, 0.0, 0.0, np.zeros(6), 0, 0
+    if len(w) <= MAX_WRENCHES:
+        for budget in FACET_BUDGETS:
+            result = expand_nearest(w, _NO_CENTERS, _NO_AXES, 0.0, budget)
+            if result[0] != SPENT:
+                return result
+    return FAILED, 0.0, 0.0, np.zeros(6), 0, 0
+
+
+def _largest(w: NDArray[np.float64]) -> float:
+    """Return the norm of the largest wrench."""
+    return float(np.sqrt(np.max(np.sum(w * w, axis=1))))
 
 
 def hull_volume(wrenches: ArrayLike) -> float:
