@@ -1,0 +1,264 @@
+"""One trial: put the open hand at a pose, close it, find the contacts, measure how well they hold the object."""
+
+from dataclasses import dataclass, field
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.errors import InputError, unknown_name
+from surehold.grasping.closing import CLOSING_MODES, close_hand, hand_gaps, link_ends
+from surehold.grasping.contacts import (
+    AROUND,
+    CONTACT_MODELS,
+    DEPTH,
+    PALM_PITCH,
+    STATIONS,
+    Contacts,
+    as_contacts,
+    skin_contacts,
+    touch_contacts,
+)
+from surehold.grasping.distance_field import DistanceField, distance_field
+from surehold.grasping.hand import PALM, Hand, hand_named, link_name
+from surehold.grasping.meshes import GraspObject, shipped_object
+from surehold.grasping.poses import Pose
+from surehold.grasping.synergy import CLOSED, ClosingMotion, power_grasp
+from surehold.grasping.wrench_space import WrenchQuality, wrench_quality
+
+__all__ = ["QUALITIES", "STATUSES", "Grasp", "Simulator"]
+
+Array = NDArray[np.float64]
+Status = Literal["ok", "no contact", "initial collision", "not closed"]
+
+QUALITIES: Final = ("epsilon", "volume")
+#: What became of a trial. "ok": force closure. "no contact": fewer than two contacts. "initial collision": the open hand
+#: is inside the object. "not closed": contacts that do not resist every wrench. All but "ok" have quality 0.
+STATUSES: Final = ("ok", "no contact", "initial collision", "not closed")
+
+_NO_CONTACTS: Final = as_contacts(np.empty((0, 8)))
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp:
+    """Outcome of one trial. Points and normals are in the frame of the object."""
+
+    status: Status  #: see `STATUSES`
+    quality: float  #: the measure that was asked for; 0 unless the status is "ok"
+    pose: Pose  #: from the palm frame to the object's frame
+    s1: float  #: posture variable [rad]
+    joints: Array = field(repr=False)  #: (5, 4) joint angles at the end, index to thumb [rad]; a collision leaves it open
+    open_joints: Array = field(repr=False)  #: (5, 4) joint angles of the open hand [rad]
+    contacts: Contacts = field(repr=False)  #: of the quality; empty after a collision
+    touching: tuple[str, ...] = field(repr=False)  #: names of the links that were stopped by the object
+    penetration: float  #: how deep the open hand is inside the object [m]; 0 without a collision
+    wrench: WrenchQuality | None = field(repr=False, default=None)  #: details of the measure; None without two contacts
+
+
+class _Geometry(NamedTuple):
+    """The hand in the object's frame, as the compiled functions take it."""
+
+    bases: Array  # (5, 3, 4)
+    palm: Array  # (3, 4) frame of the palm's box
+    sides: Array  # (5, 3) bending axes
+
+
+class Simulator:
+    """A hand and an object: `grasp` closes the one on the other and measures the grasp.
+
+    Parameters
+    ----------
+    hand
+        A `Hand` or its name, "icub-left".
+    obj
+        A `GraspObject` or the name of a shipped one: "mug", "bottle", "glass", "drill".
+    contact
+        "graded" (soft touch, continuous), "patch" or "single" (one for each touching link).
+    quality
+        "epsilon" (radius of the largest ball about the origin in the hull of the wrenches) or "volume" (of that hull).
+    closing
+        "adaptive" (links beyond a touching one go on) or "synergy" (a touch stops the whole finger).
+    friction
+        Coefficient of friction; the object's own if not given.
+    edges
+        Edges of the friction cone.
+    depth
+        Depth of the soft touch [m].
+    object_pose
+        From the object's frame to the world, in which `grasp` takes poses; the world is the object's frame if not given.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or a number is out of range.
+
+    Notes
+    -----
+    A trial depends on its arguments alone; it is the same bit for bit when repeated. All geometry is computed in the
+    object's frame, with torques about the center of mass, divided by half the longest edge of the object's box: a
+    motion of hand and object together changes nothing.
+    """
+
+    def __init__(
+        self,
+        hand: Hand | str = "icub-left",
+        obj: GraspObject | str = "mug",
+        *,
+        contact: str = "graded",
+        quality: str = "epsilon",
+        closing: str = "adaptive",
+        friction: float | None = None,
+        edges: int = 8,
+        depth: float = DEPTH,
+        object_pose: Pose | None = None,
+    ):
+        if contact not in CONTACT_MODELS:
+            raise unknown_name("contact model", contact, CONTACT_MODELS)
+        if quality not in QUALITIES:
+            raise unknown_name("quality measure", quality, QUALITIES)
+        if closing not in CLOSING_MODES:
+            raise unknown_name("closing", closing, CLOSING_MODES)
+        self.hand: Final[Hand] = hand_named(hand) if isinstance(hand, str) else hand
+        self.object: Final[GraspObject] = shipped_object(obj) if isinstance(obj, str) else obj
+        self.contact: Final = contact
+        self.quality: Final = quality
+        self.closing: Final = closing
+        self.friction: Final[float] = self.object.friction if friction is None else float(friction)
+        if not (np.isfinite(self.friction) and self.friction >= 0.0):
+            raise InputError(f"friction is {friction!r}; give a number of 0 or more, such as 0.5.")
+        if isinstance(edges, bool) or not isinstance(edges, int | np.integer) or edges < 3:
+            raise InputError(f"edges of the friction cone are {edges!r}; give an integer of 3 or more, such as 8.")
+        self.edges: Final[int] = int(edges)
+        if not 0.0 < depth <= 0.005:
+            raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.005 m.")
+        self.depth: Final[float] = float(depth)
+        self.object_pose: Final[Pose] = Pose() if object_pose is None else object_pose
+        self.field: Final[DistanceField] = distance_field(self.object)
+        self._reach: Final[Array] = self.hand.reach()
+
+    def grasp(self, pose: Pose, s1: float = 0.0) -> Grasp:
+        """Close the hand at a pose of its palm in the world with posture s1 [rad]; a bad grasp has quality 0.
+
+        Raises
+        ------
+        InputError
+            If the pose or s1 is not finite.
+        """
+        if not np.isfinite(s1) or not np.all(np.isfinite([*pose.position, *pose.quaternion])):
+            raise InputError(f"pose {pose} with s1 = {s1!r} is not finite; give finite numbers.")
+        relative = self.object_pose.inverse() @ pose
+        motion = power_grasp(self.hand, float(s1))
+        geometry = self._place(relative)
+        opened = motion.joints(0.0)
+        gaps = self.gaps(relative, opened, geometry)
+        penetration = max(0.0, -float(gaps.min()))
+        if penetration > 0.0:
+            return Grasp("initial collision", 0.0, relative, s1, opened, opened, _NO_CONTACTS, (), penetration)
+        joints, touched = self._close(geometry, motion)
+        contacts = self._contacts(geometry, joints, touched)
+        touching = tuple(link_name(int(body)) for body in np.flatnonzero(touched))
+        if len(contacts) < 2:
+            return Grasp("no contact", 0.0, relative, s1, joints, opened, contacts, touching, 0.0)
+        wrench = wrench_quality(
+            contacts.points,
+            contacts.normals,
+            friction=self.friction,
+            edges=self.edges,
+            torque_length=self.object.torque_length,
+            origin=self.object.center_of_mass,
+            weights=contacts.weights,
+        )
+        if not wrench.force_closure:
+            return Grasp("not closed", 0.0, relative, s1, joints, opened, contacts, touching, 0.0, wrench)
+        value = wrench.epsilon if self.quality == "epsilon" else wrench.volume
+        return Grasp("ok", float(value), relative, s1, joints, opened, contacts, touching, 0.0, wrench)
+
+    def gaps(self, pose: Pose, joints: ArrayLike, geometry: _Geometry | None = None) -> Array:
+        """Return the gaps (21,) between the object and the hand's bodies at rest [m], the palm last.
+
+        Negative values are rough depths. The gap of the palm is exact up to 10 mm, beyond that only known to be larger.
+
+        Parameters
+        ----------
+        pose
+            From the palm frame to the object's frame.
+        joints
+            Joint angles, (5, 4) [rad].
+        """
+        placed = self._place(pose) if geometry is None else geometry
+        angles = np.ascontiguousarray(joints, dtype=np.float64)
+        ends = link_ends(placed.bases, self.hand.chains, angles)
+        return hand_gaps(
+            self.field.nodes,
+            self.field.frame,
+            ends,
+            self.hand.radius,
+            placed.palm,
+            self.hand.palm_half_extents,
+            self.hand.palm_rounding,
+            0.010,
+        )
+
+    def warm_up(self) -> None:
+        """Compile what a trial needs, if it is not yet in the cache: some seconds once for an installation."""
+        half = self.object.box_half_extents
+        beside = Pose((float(-self.hand.grasp_center[0]), 0.0, float(self.object.box_center[2] - half[2] - 0.05)))
+        motion = power_grasp(self.hand)
+        geometry = self._place(beside)
+        joints, touched = self._close(geometry, motion)
+        self.gaps(beside, joints, geometry)
+        touched[3] = True
+        skin_or_touch = (self._skin(geometry, joints), self._touch(geometry, joints, touched))
+        assert all(rows.shape[1] == 8 for rows in skin_or_touch)
+        points = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
+        wrench_quality(points, -points, weights=np.ones(4))
+
+    def _place(self, pose: Pose) -> _Geometry:
+        r, p = pose.rotation, np.asarray(pose.position)
+        bases = np.concatenate([r @ self.hand.bases[:, :, :3], (self.hand.bases[:, :, 3] @ r.T + p)[:, :, None]], axis=2)
+        palm = np.column_stack([r, r @ self.hand.palm_center + p])
+        # The bending axis of a finger is its base's -y; abduction turns it by a few degrees, which is of no matter here.
+        return _Geometry(np.ascontiguousarray(bases), palm, np.ascontiguousarray(-bases[:, :, 1]))
+
+    def _close(self, geometry: _Geometry, motion: ClosingMotion) -> tuple[Array, NDArray[np.bool_]]:
+        joints, touched, _ = close_hand(
+            self.field.nodes,
+            self.field.frame,
+            geometry.bases,
+            self.hand.chains,
+            self._reach,
+            np.stack(motion),
+            self.hand.radius,
+            geometry.palm,
+            self.hand.palm_half_extents,
+            self.hand.palm_rounding,
+            self.closing == "adaptive",
+            CLOSED,
+        )
+        return joints, touched
+
+    def _contacts(self, geometry: _Geometry, joints: Array, touched: NDArray[np.bool_]) -> Contacts:
+        if self.contact == "single":
+            return as_contacts(self._touch(geometry, joints, touched))
+        return as_contacts(self._skin(geometry, joints))
+
+    def _touch(self, geometry: _Geometry, joints: Array, touched: NDArray[np.bool_]) -> Array:
+        ends = link_ends(geometry.bases, self.hand.chains, joints)
+        return touch_contacts(self.field.nodes, self.field.frame, ends, touched, self.hand.radius)
+
+    def _skin(self, geometry: _Geometry, joints: Array) -> Array:
+        return skin_contacts(
+            self.field.nodes,
+            self.field.frame,
+            link_ends(geometry.bases, self.hand.chains, joints),
+            geometry.sides,
+            self.hand.radius,
+            geometry.palm,
+            self.hand.palm_half_extents,
+            self.hand.palm_rounding,
+            self.depth,
+            STATIONS,
+            AROUND,
+            PALM_PITCH,
+            self.contact == "graded",
+        )
