@@ -1,0 +1,186 @@
+"""The largest origin-centered ball in a convex hull of wrenches, the hull's distance and its volume.
+
+Notation
+--------
+w        wrenches whose convex hull H is measured, (m, 6); round contacts may be in H beside them
+h(u)     support function of H, for a unit vector u (6,)
+epsilon  radius of the largest ball about the origin in H: min of h(u) over u, 0 if that is negative
+
+Distances below TOLERANCE times the largest wrench are exactly 0. Two ways to epsilon: the compiled expansion of the
+nearest facet, and, should rounding ever spoil that, the full hull of joggled wrenches by Qhull. Numerical failure is
+never
+scored as 0.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.grasping.contact_wrenches import RoundContacts, finite_array
+from surehold.grasping.nearest_facet import DONE, FAILED, FLAT, SPENT, TOLERANCE, expand_nearest
+
+__all__ = ["InscribedBall", "ball_radius", "hull_volume", "inscribed_ball", "nearest_point"]
+
+FACET_BUDGETS = (4096, 65_536, 1_048_576)  # memory for so many facets is tried in turn; grasps need some thousands
+MAX_WRENCHES = 65_535  # the compiled expansion packs four indices of wrenches into 64 bits
+ROUND_GAP = 1e-9
+"""Difference of the bounds at which round cones count as measured, as a fraction of the largest wrench."""
+
+_NO_ROUND = RoundContacts(np.zeros((0, 6)), np.zeros((0, 6, 3)))
+
+
+class InscribedBall(NamedTuple):
+    """The largest origin-centered ball in a convex hull of wrenches, and how it was found."""
+
+    signed: float
+    """Radius; exactly 0 on the boundary or in a flat hull; outside, minus the distance from origin to hull."""
+    lower: float
+    """Certified lower bound of the radius: the nearest facet of an inscribed polytope; 0 if there is no ball."""
+    upper: float
+    """Certified upper bound of the radius: h(normal); 0 if there is no ball."""
+    normal: NDArray[np.float64]
+    """Unit vector in which the hull resists least, (6,); zero if the hull is flat and holds the origin."""
+    expansions: int
+    """Wrenches added after the first seven."""
+    facets: int
+    """Facets made on the way."""
+    fallback: bool
+    """Whether rounding spoiled the expansion and the full hull by Qhull was used."""
+
+    @property
+    def radius(self) -> float:
+        """The radius, 0 where there is no ball."""
+        return max(self.signed, 0.0)
+
+
+def ball_radius(wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None) -> float:
+    """Return epsilon of wrenches (m, 6), C-contiguous and finite; the fast path, nothing else is computed.
+
+    With round contacts, their cone edges (any number of edges, 4 will do) must be among the wrenches.
+    """
+    status, lower, upper, _, _, _ = _expand(wrenches, round_contacts)
+    if status == FAILED:
+        return _ball_from_hull(wrenches)[0]
+    if status == DONE and lower > TOLERANCE * _largest(wrenches):
+        return upper if round_contacts is None else lower
+    return 0.0
+
+
+def inscribed_ball(wrenches: ArrayLike, round_contacts: RoundContacts | None = None) -> InscribedBall:
+    """Return the largest origin-centered ball in the hull of wrenches (m, 6), signed, with bounds and diagnostics.
+
+    Round contacts as in `ball_radius`. Raises InputError if the wrenches are not finite or not of shape (m, 6).
+    """
+    w = np.ascontiguousarray(finite_array("wrenches", wrenches, (None, 6)))
+    status, lower, upper, normal, expansions, facets = _expand(w, round_contacts)
+    fallback = status == FAILED
+    if fallback:
+        lower, normal = _ball_from_hull(w)
+        upper = lower if round_contacts is None else max(lower, _round_support(normal, round_contacts))
+    if status in (DONE, FAILED) and lower > TOLERANCE * _largest(w):
+        signed = upper if round_contacts is None else lower
+        return InscribedBall(signed, lower, upper, normal, expansions, facets, fallback)
+    nearest = nearest_point(w, round_contacts) if len(w) else np.zeros(6)
+    distance = float(np.sqrt(nearest @ nearest))
+    if distance > 0.0:
+        normal = -nearest / distance
+    upper = max(upper, 0.0) if status == DONE else 0.0
+    return InscribedBall(-distance if distance else 0.0, 0.0, upper, normal, expansions, facets, fallback)
+
+
+def nearest_point(wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None) -> NDArray[np.float64]:
+    """Return the point of the hull of wrenches (m, 6), m >= 1, nearest to the origin; exactly 0 if that is inside.
+
+    Wolfe 1976, "Finding the nearest point in a polytope": keep a corral of few wrenches whose convex hull holds the
+    point of their affine hull nearest to the origin; add the wrench that lies farthest towards the origin from there;
+    drop those whose weight turns negative.
+    """
+    centers, axes = round_contacts or _NO_ROUND
+    scale = _largest(wrenches)
+    stop = scale * (ROUND_GAP if len(centers) else TOLERANCE)
+    corral = wrenches[[np.argmin(np.sum(wrenches**2, axis=1))]]
+    weights = np.ones(1)
+    x = corral[0]
+    for _ in range(1000):
+        length = np.sqrt(x @ x)
+        if length <= stop:
+            return np.zeros(6)
+        u = x / length
+        added = wrenches[np.argmin(wrenches @ u)]
+        if len(centers):
+            components = np.einsum("j,ijk->ik", u, axes)
+            depths = np.sqrt(np.sum(components**2, axis=1))
+            i = int(np.argmin(centers @ u - depths))
+            if centers[i] @ u - depths[i] < added @ u and depths[i] > 0.0:
+                added = centers[i] - axes[i] @ components[i] / depths[i]
+        if length - added @ u <= stop or (corral == added).all(axis=1).any():
+            break
+        corral = np.vstack((corral, added))
+        weights = np.append(weights, 0.0)
+        while len(corral) > 1:
+            rest = np.linalg.lstsq((corral[1:] - corral[0]).T, -corral[0], rcond=1e-13)[0]
+            target = np.concatenate(([1.0 - rest.sum()], rest))
+            falling = (target <= 1e-13) & (weights > target)
+            if not falling.any():
+                weights = target
+                break
+            step = np.min(weights[falling] / (weights[falling] - target[falling]))
+            weights = weights + step * (target - weights)
+            kept = weights > 1e-13
+            if kept.all() or not kept.any():
+                return x
+            corral, weights = corral[kept], weights[kept]
+        x = weights @ corral / weights.sum()
+    return x
+
+
+def hull_volume(wrenches: ArrayLike) -> float:
+    """Return the volume of the convex hull of points (m, k), exactly 0 if they lie in a hyperplane (Qhull)."""
+    from scipy.spatial import ConvexHull
+
+    w = np.asarray(wrenches, float)
+    if len(w) <= w.shape[1]:
+        return 0.0
+    spread = np.linalg.svd(w - w.mean(axis=0), compute_uv=False)
+    if spread[-1] <= TOLERANCE * spread[0]:
+        return 0.0
+    return float(ConvexHull(w, qhull_options="QJ Pp").volume)
+
+
+def _expand(
+    w: NDArray[np.float64], round_contacts: RoundContacts | None
+) -> tuple[int, float, float, NDArray[np.float64], int, int]:
+    """Run `expand_nearest` with the memory it needs; FAILED means: use the full hull."""
+    if len(w) < 7:
+        return FLAT, 0.0, 0.0, np.zeros(6), 0, 0
+    centers, axes = round_contacts or _NO_ROUND
+    gap = ROUND_GAP * _largest(w) if len(centers) else 0.0
+    for budget in FACET_BUDGETS if len(w) <= MAX_WRENCHES else ():
+        status, lower, upper, normal, expansions, facets = expand_nearest(w, centers, axes, gap, budget)
+        if status == SPENT and len(centers) and budget == FACET_BUDGETS[-1]:
+            status = DONE  # the bounds hold, they are only wider apart
+        if status != SPENT:
+            return status, lower, upper, normal, expansions, facets
+    return FAILED, 0.0, 0.0, np.zeros(6), 0, 0
+
+
+def _ball_from_hull(w: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return (radius, normal of the nearest facet) by the full hull; accurate to Qhull's joggle, about 1e-10."""
+    from scipy.spatial import ConvexHull
+
+    equations = ConvexHull(w, qhull_options="QJ Pp").equations
+    nearest = int(np.argmax(equations[:, -1]))
+    radius = -float(equations[nearest, -1])
+    return (radius if radius > 1e-9 * _largest(w) else 0.0), equations[nearest, :-1].copy()  # joggled zero is zero
+
+
+def _round_support(u: NDArray[np.float64], round_contacts: RoundContacts) -> float:
+    """Return h(u) of round contacts."""
+    centers, axes = round_contacts
+    return float(np.max(centers @ u + np.sqrt(np.sum(np.einsum("j,ijk->ik", u, axes) ** 2, axis=1))))
+
+
+def _largest(w: NDArray[np.float64]) -> float:
+    """Return the norm of the largest wrench."""
+    return float(np.sqrt(np.max(np.einsum("ij,ij->i", w, w))))
