@@ -1,0 +1,1 @@
+"""Pictures and pages of runs: they take data and start nothing."""

@@ -1,0 +1,187 @@
+"""From a finished run to the data of its report: candidates, traces, and the model over one or two variables."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.maximization import Result
+from surehold.optimization.quadratures import sigma_points
+from surehold.optimization.surrogate import Posterior, mixture
+from surehold.problems.perturbation import RobustScore
+from surehold.reports.run_report import Candidate, RunReport, Scene, Surface, Variable
+
+__all__ = ["answers", "candidate", "report_of", "surfaces_of"]
+
+_LINE, _SQUARE = 301, 61  # grid points along a line, and along each side of a square
+
+
+def answers(result: Result) -> dict[str, int]:
+    """Return the trials to show by label, "highest observed" and "recommended"; one entry if they are the same."""
+    highest = result.best_index
+    recommended = int(np.argmin(np.abs(result.optimizer.box.to_unit(result.X) - _unit_answer(result)).max(axis=1)))
+    if recommended == highest or np.array_equal(result.X[recommended], result.X[highest]):
+        return {"recommended": highest}
+    return {"highest observed": highest, "recommended": recommended}
+
+
+def candidate(
+    result: Result,
+    label: str,
+    index: int,
+    score: RobustScore | None,
+    *,
+    status: str = "",
+    pose: str = "",
+    details: Mapping[str, str] | None = None,
+    scene: Scene | None = None,
+) -> Candidate:
+    """Return the candidate of trial `index` with its re-queries; what the model expects of it where that is known."""
+    told = result.recommendation if label == "recommended" else None
+    return Candidate(
+        label,
+        result.X[index],
+        float(result.y[index]),
+        index,
+        np.empty(0) if score is None else score.values,
+        np.empty((0, result.X.shape[1])) if score is None else score.points,
+        0 if score is None else score.n_failed,
+        None if told is None or score is None else told.mean,
+        None if told is None or score is None else told.std,
+        status,
+        pose,
+        details or {},
+        scene,
+    )
+
+
+def report_of(
+    result: Result,
+    candidates: Sequence[Candidate],
+    *,
+    title: str,
+    settings: Mapping[str, Any],
+    noise: InputNoise | None,
+    units: Mapping[str, str] | None = None,
+    quality_name: str = "value",
+    disturbance: str = "the input is off",
+    planned_trials: int | None = None,
+    notes: Sequence[str] = (),
+) -> RunReport:
+    """Return the report of a run: its trials, its candidates, its traces and its model.
+
+    Parameters
+    ----------
+    noise
+        The input noise that the candidates were scored with, whether or not the optimizer knew of it.
+    units
+        Unit of each variable by name, such as {"dx": "m", "rx": "rad"}.
+
+    Raises
+    ------
+    InputError
+        If a unit names a variable that is not there.
+    """
+    optimizer = result.optimizer
+    box = optimizer.box
+    for name in units or {}:
+        if name not in box.names:
+            raise InputError(
+                f"unit given for '{name}', which is no variable; the variables are {', '.join(box.names)}."
+            )
+    variables = tuple(
+        Variable(name, float(lower), float(upper), (units or {}).get(name, ""))
+        for name, lower, upper in zip(box.names, box.lower, box.upper, strict=True)
+    )
+    y = result.y
+    robust = np.full(y.size, np.nan)
+    for trial in result.trials:
+        if trial.recommendation is not None and trial.index < y.size and optimizer.input_noise is not None:
+            robust[trial.index] = trial.recommendation.mean
+    return RunReport(
+        title=title,
+        variables=variables,
+        X=result.X,
+        y=y,
+        n_initial=optimizer.n_initial,
+        best_trace=_running_maximum(y),
+        candidates=tuple(candidates),
+        settings=settings,
+        seed=optimizer.seed,
+        quality_name=quality_name,
+        disturbance=disturbance,
+        robust_trace=robust if np.isfinite(robust).any() else None,
+        noise=None if noise is None else noise.unit_covariance(box) * np.outer(box.widths, box.widths),
+        surfaces=surfaces_of(optimizer.posterior, box, noise, candidates[-1].x),
+        interrupted=result.interrupted,
+        planned_trials=planned_trials,
+        notes=tuple(notes),
+    )
+
+
+def surfaces_of(
+    posterior: Posterior, box: Box, noise: InputNoise | None, x: NDArray[np.float64]
+) -> tuple[Surface, ...]:
+    """Return the model over the box for d = 1 and 2; for d > 2 a slice through x over the two most important variables.
+
+    A variable matters as much as the posterior mean varies along it through x.
+    """
+    center = np.clip(box.to_unit(x), 0.0, 1.0)
+    if box.dimension == 1:
+        return (_surface(posterior, box, noise, center, (0,), _LINE, ""),)
+    if box.dimension == 2:
+        return (_surface(posterior, box, noise, center, (0, 1), _SQUARE, ""),)
+    first, second = sorted(_most_important(posterior, center))
+    note = (
+        f"slice through the recommended point over {box.names[first]} and {box.names[second]}, the two that matter most"
+    )
+    return (_surface(posterior, box, noise, center, (first, second), _SQUARE, note),)
+
+
+def _surface(
+    posterior: Posterior,
+    box: Box,
+    noise: InputNoise | None,
+    center: NDArray[np.float64],
+    variables: tuple[int, ...],
+    points: int,
+    note: str,
+) -> Surface:
+    line = np.linspace(0.0, 1.0, points)
+    shape = (points,) * len(variables)
+    queries = np.tile(center, (points ** len(variables), 1))
+    for k, grid in zip(variables, np.meshgrid(*[line] * len(variables), indexing="ij"), strict=True):
+        queries[:, k] = grid.ravel()
+    mean, variance = mixture(posterior.moments(queries))
+    robust_mean = robust_std = None
+    if noise is not None:
+        averaged, spread = mixture(posterior.average(queries, *sigma_points(noise.unit_covariance(box))))
+        robust_mean, robust_std = averaged.reshape(shape), np.sqrt(spread).reshape(shape)
+    axes = tuple(box.lower[k] + line * box.widths[k] for k in variables)
+    return Surface(
+        variables, axes, mean.reshape(shape), robust_mean, np.sqrt(variance).reshape(shape), robust_std, note
+    )
+
+
+def _most_important(posterior: Posterior, center: NDArray[np.float64]) -> tuple[int, int]:
+    line = np.linspace(0.0, 1.0, 41)
+    variation = []
+    for k in range(center.size):
+        queries = np.tile(center, (line.size, 1))
+        queries[:, k] = line
+        variation.append(float(np.var(mixture(posterior.moments(queries))[0])))
+    order = np.argsort(-np.array(variation), kind="stable")
+    return int(order[0]), int(order[1])
+
+
+def _unit_answer(result: Result) -> NDArray[np.float64]:
+    return result.optimizer.box.to_unit(result.recommendation.x)
+
+
+def _running_maximum(y: NDArray[np.float64]) -> NDArray[np.float64]:
+    best = np.maximum.accumulate(np.where(np.isfinite(y), y, -np.inf))
+    return np.where(np.isfinite(best), best, np.nan)

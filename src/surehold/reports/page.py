@@ -1,0 +1,233 @@
+"""One run as one HTML file that opens without network: text, pictures and the 3-D scene are all inside."""
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from surehold.reports import figures
+from surehold.reports.run_report import Candidate, RunReport, Surface
+from surehold.reports.scene import scene_data
+from surehold.reports.verdict import change, coordinates, number, verdict
+
+__all__ = ["render"]
+
+_TEMPLATES: Final = Path(__file__).parent / "templates"
+
+
+def render(report: RunReport) -> str:
+    """Return the page of a run as HTML text.
+
+    Raises
+    ------
+    InputError
+        If a scene of the report is malformed or too large.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    from surehold import __version__
+
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    told = verdict(report)
+    scene = scene_data(report.candidates)
+    if scene is not None:
+        for view, candidate in zip(scene["views"], (c for c in report.candidates if c.scene is not None), strict=True):
+            view["note"] = _scene_note(candidate)
+    return environment.get_template("report.html.j2").render(
+        report=report,
+        verdict=told,
+        version=__version__,
+        css=Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8")),
+        n_initial=min(report.n_initial, report.y.size),
+        n_failed=int(report.failed.sum()),
+        noise_text=_noise_text(report),
+        two=len(report.candidates) > 1,
+        cards=[_card(report, c, told.refused) for c in report.candidates],
+        scene=None if scene is None else Markup(_json_for_html(scene)),
+        scene_labels=[_label(report, c) for c in report.candidates if c.scene is not None],
+        scene_has_box=any(c.scene is not None and c.scene.box is not None for c in report.candidates),
+        three=Markup("" if scene is None else _vendored("three.bundle.min.js")),
+        scene_script=Markup((_TEMPLATES / "scene.js").read_text(encoding="utf-8")),
+        maps=[_map(report, view, i) for i, view in enumerate(report.surfaces)],
+        trace=Markup(figures.inline_svg(figures.trace(report), "trace", "Best and robust value by trial")),
+        rows=_rows(report),
+        settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
+        trials=_trials(report),
+    )
+
+
+def _json_for_html(data: Any) -> str:
+    """Return JSON that cannot end the `<script>` it stands in."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _vendored(name: str) -> str:
+    return (_TEMPLATES / "vendor" / name).read_text(encoding="utf-8")
+
+
+def _label(report: RunReport, candidate: Candidate) -> dict[str, str]:
+    alone = len(report.candidates) == 1
+    role = "high" if candidate is report.highest and not alone else "answer"
+    text = "Highest observed = recommended" if alone else candidate.label.capitalize()
+    return {"role": role, "mark": "▲" if role == "high" else "●", "text": text}
+
+
+def _card(report: RunReport, candidate: Candidate, refused: bool) -> dict[str, Any]:
+    from markupsafe import Markup
+
+    label = _label(report, candidate)
+    shaken = candidate.values.size > 0
+    tag = ""
+    if refused and shaken:
+        tag = "refused" if label["role"] == "high" else "holds"
+    svg = None
+    if shaken:
+        name = f"shake-{label['role']}"
+        text = (
+            f"Histogram of {candidate.values.size} re-queries of the {candidate.label} point: mean "
+            f"{number(candidate.mean)}, worst {number(candidate.worst)}"
+        )
+        svg = Markup(figures.inline_svg(figures.shake(report, candidate), name, text))
+    return {
+        **label,
+        "title": label["text"],
+        "tag": tag,
+        "tag_class": "no" if tag == "refused" else "yes",
+        "where": candidate.pose or coordinates(report, candidate.x),
+        "quality": number(candidate.quality),
+        "mean": number(candidate.mean) if shaken else "",
+        "worst": number(candidate.worst),
+        "std": number(candidate.std, 2),
+        "n": candidate.values.size,
+        "change": change(candidate) if shaken else "",
+        "svg": svg,
+    }
+
+
+def _scene_note(candidate: Candidate) -> str:
+    parts = [f"{candidate.label.capitalize()}: {number(candidate.quality)} when hit exactly"]
+    if candidate.values.size:
+        parts.append(f"{number(candidate.mean)} on average and {number(candidate.worst)} at worst when off")
+    if candidate.scene is not None and candidate.scene.contacts is not None:
+        n = len(candidate.scene.contacts.points)
+        parts.append(f"{n} contact{'' if n == 1 else 's'}")
+    if candidate.status:
+        parts.append(f"status {candidate.status}")
+    return ", ".join(parts) + "."
+
+
+def _noise_text(report: RunReport) -> str:
+    if report.noise is None:
+        return ""
+    deviations = np.sqrt(np.diag(report.noise))
+    shown = [
+        f"{v.name} ± {number(s * v.factor, 2)}{'' if v.shown_unit in ('', '°') else ' '}{v.shown_unit}"
+        for v, s in zip(report.variables, deviations, strict=True)
+    ]
+    if len(shown) > 4:
+        shares = deviations / np.array([v.upper - v.lower for v in report.variables])
+        if np.allclose(shares, shares[0]):
+            return f"± {number(100.0 * float(shares[0]), 2)} % of each range"
+    return ", ".join(shown)
+
+
+def _map(report: RunReport, view: Surface, index: int) -> dict[str, Any]:
+    from markupsafe import Markup
+
+    names = " and ".join(report.variables[i].name for i in view.variables)
+    is_map = len(view.variables) == 2
+    kinds = [False, True] if is_map and view.robust_mean is not None else [False]
+    return {
+        "note": view.note,
+        "is_map": is_map,
+        "svgs": [
+            Markup(
+                figures.inline_svg(
+                    figures.surface(report, view, robust),
+                    f"map{index}{'u' if robust else 'm'}",
+                    f"{'Unscented mean' if robust else 'Mean'} of the model over {names}, with the trials",
+                )
+            )
+            for robust in kinds
+        ],
+    }
+
+
+def _rows(report: RunReport) -> list[tuple[str, list[str]]]:
+    every = report.candidates
+
+    def row(name: str, cell: Any) -> tuple[str, list[str]]:
+        return name, [cell(c) for c in every]
+
+    rows = [
+        row(v.label, lambda c, i=i, v=v: number(float(c.x[i]) * v.factor, 4)) for i, v in enumerate(report.variables)
+    ]
+    if any(c.pose for c in every):
+        rows.append(row("pose", lambda c: c.pose or "–"))
+    if any(c.status for c in every):
+        rows.append(row("status", lambda c: c.status or "–"))
+    rows.append(row("trial", lambda c: "–" if c.trial is None else str(c.trial + 1)))
+    rows.append(row(f"{report.quality_name}, hit exactly", lambda c: number(c.quality, 4)))
+    if any(c.values.size for c in every):
+        n = max(c.values.size + c.n_failed for c in every)
+        rows.append(row(f"mean of {n} perturbed re-queries", lambda c: number(c.mean, 4)))
+        rows.append(row("worst of them", lambda c: number(c.worst, 4)))
+        rows.append(row("standard deviation", lambda c: number(c.std, 3)))
+        if any(c.n_failed for c in every):
+            rows.append(row("re-queries without value", lambda c: str(c.n_failed)))
+    if any(c.predicted_mean is not None for c in every):
+        rows.append(
+            row(
+                "expected by the model under the noise",
+                lambda c: (
+                    "–"
+                    if c.predicted_mean is None
+                    else number(c.predicted_mean, 4)
+                    + (f" ± {number(c.predicted_std, 2)}" if c.predicted_std is not None else "")
+                ),
+            )
+        )
+    names = dict.fromkeys(name for c in every for name in c.details)
+    rows.extend(row(name, lambda c, name=name: c.details.get(name, "–")) for name in names)
+    return rows
+
+
+def _setting(value: Any) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _trials(report: RunReport) -> list[dict[str, Any]]:
+    factors = np.array([v.factor for v in report.variables])
+    rows = []
+    for i, (x, y) in enumerate(zip(report.X * factors, report.y, strict=True)):
+        notes, style = (["initial"] if i < report.n_initial else []), ""
+        if report.highest.trial == i:
+            notes.append("highest observed")
+            style = "best"
+        if report.recommended.trial == i:
+            notes.append("recommended")
+            style = "chosen"
+        failed = not np.isfinite(y)
+        rows.append(
+            {
+                "number": i + 1,
+                "x": [number(float(v), 4) for v in x],
+                "y": "failed" if failed else number(float(y), 4),
+                "note": ", ".join(notes),
+                "style": style,
+            }
+        )
+    return rows

@@ -1,0 +1,184 @@
+"""What a report of one run shows: plain data, gathered by the caller; nothing here computes or draws.
+
+Letters: n trials, d variables, q perturbed re-queries of a candidate, c contacts.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError
+
+__all__ = ["Candidate", "ContactSet", "ObjectBox", "RunReport", "Scene", "SceneMesh", "Surface", "Variable"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One input. Lengths in m and angles in rad are shown in mm and degrees."""
+
+    name: str
+    lower: float
+    upper: float
+    unit: str = ""  #: "m", "rad", any other unit as text, or "" for none
+
+    @property
+    def factor(self) -> float:
+        """What a value is multiplied with before it is shown."""
+        return {"m": 1000.0, "rad": 180.0 / np.pi}.get(self.unit, 1.0)
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit that is shown."""
+        return {"m": "mm", "rad": "°"}.get(self.unit, self.unit)
+
+    @property
+    def label(self) -> str:
+        """Name and shown unit, as on an axis."""
+        return f"{self.name} [{self.shown_unit}]" if self.shown_unit else self.name
+
+
+@dataclass(frozen=True)
+class SceneMesh:
+    """A triangle mesh of a scene; equal meshes of two scenes are stored once."""
+
+    name: str
+    vertices: Floats  #: (v, 3) [m]
+    faces: NDArray[np.int64]  #: (f, 3) indices into the vertices
+    color: str = "#8a93a3"  #: CSS hexadecimal
+    see_through: bool = False  #: drawn half transparent on request, so that contacts inside are seen
+
+
+@dataclass(frozen=True)
+class ContactSet:
+    """Where the hand touches."""
+
+    points: Floats  #: (c, 3) [m]
+    normals: Floats  #: (c, 3) unit vectors into the object
+    friction: Floats  #: (c,) friction coefficients
+    weights: Floats  #: (c,) share of a full contact, 0 to 1
+
+
+@dataclass(frozen=True)
+class ObjectBox:
+    """The oriented box of the object."""
+
+    center: Floats  #: (3,) [m]
+    size: Floats  #: (3,) edge lengths [m]
+    rotation: Floats = field(default_factory=lambda: np.eye(3))  #: (3, 3) columns are the box's axes
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A grasp in three dimensions, in the frame of the object, z up."""
+
+    meshes: tuple[SceneMesh, ...]
+    contacts: ContactSet | None = None
+    box: ObjectBox | None = None
+    view: tuple[float, float, float] = (0.9, -1.2, 0.7)  #: direction from the object to the eye
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An answer that the run offers, and what became of it when it was re-queried with perturbed inputs."""
+
+    label: str  #: "highest observed" or "recommended"
+    x: Floats  #: (d,) in the units of the box
+    quality: float  #: value of the trial at x, undisturbed
+    trial: int | None = None  #: index of that trial, from 0
+    values: Floats = field(default_factory=lambda: np.empty(0))  #: (q,) outcomes of the re-queries; empty without noise
+    points: Floats = field(default_factory=lambda: np.empty((0, 0)))  #: (q + failed, d) where they were made
+    n_failed: int = 0  #: re-queries that gave no value
+    predicted_mean: float | None = None  #: what the model expects under the noise
+    predicted_std: float | None = None
+    status: str = ""  #: of a grasp, such as "ok" or "no contact"
+    pose: str = ""  #: pose and posture in words
+    details: Mapping[str, str] = field(default_factory=dict)  #: further lines of the table
+    scene: Scene | None = None
+
+    @property
+    def mean(self) -> float:
+        """Mean of the re-queries; NaN if there are none."""
+        return float(np.mean(self.values)) if self.values.size else float("nan")
+
+    @property
+    def std(self) -> float:
+        """Sample standard deviation of the re-queries; NaN if there are none."""
+        if self.values.size == 0:
+            return float("nan")
+        return float(np.std(self.values, ddof=1)) if self.values.size > 1 else 0.0
+
+    @property
+    def worst(self) -> float:
+        """Lowest of the re-queries; NaN if there are none."""
+        return float(np.min(self.values)) if self.values.size else float("nan")
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The model over one or two variables."""
+
+    variables: tuple[int, ...]  #: one or two indices of variables
+    axes: tuple[Floats, ...]  #: the grid along each, in the units of the box
+    mean: Floats  #: (g,) or (g1, g2) posterior mean
+    robust_mean: Floats | None = None  #: same shape, averaged over the input noise (unscented mean)
+    std: Floats | None = None  #: same shape, posterior standard deviation
+    robust_std: Floats | None = None
+    note: str = ""  #: such as "slice through the recommended point"
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """One finished or interrupted run."""
+
+    title: str
+    variables: tuple[Variable, ...]
+    X: Floats  #: (n, d) trials, in the units of the box
+    y: Floats  #: (n,) values; NaN where the trial failed
+    n_initial: int
+    best_trace: Floats  #: (n,) highest value so far; NaN while there is none
+    candidates: tuple[Candidate, ...]  #: highest observed first, recommended last; one if they are the same trial
+    settings: Mapping[str, Any]
+    seed: int
+    quality_name: str = "value"
+    disturbance: str = "the input is off"  #: what an imprecise execution is called, such as "the hand is off"
+    robust_trace: Floats | None = None  #: (n,) expected value under the noise of the current recommendation
+    noise: Floats | None = None  #: (d, d) covariance of the input noise, in the units of the box
+    surfaces: tuple[Surface, ...] = ()
+    interrupted: bool = False
+    planned_trials: int | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        n, d = self.y.size, len(self.variables)
+        if self.X.shape != (n, d) or self.best_trace.shape != (n,):
+            raise InputError(
+                f"report of {n} trials and {d} variables: X has shape {self.X.shape} (need ({n}, {d})), "
+                f"best_trace {self.best_trace.shape} (need ({n},))."
+            )
+        if self.robust_trace is not None and self.robust_trace.shape != (n,):
+            raise InputError(f"robust_trace has shape {self.robust_trace.shape}; it needs ({n},).")
+        if not self.candidates:
+            raise InputError("a report needs at least one candidate; give the highest observed trial.")
+        for candidate in self.candidates:
+            if candidate.x.shape != (d,):
+                raise InputError(f"candidate '{candidate.label}' has x of shape {candidate.x.shape}; it needs ({d},).")
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which trials gave no value, (n,)."""
+        return ~np.isfinite(self.y)
+
+    @property
+    def highest(self) -> Candidate:
+        """The highest trial observed."""
+        return self.candidates[0]
+
+    @property
+    def recommended(self) -> Candidate:
+        """The answer."""
+        return self.candidates[-1]

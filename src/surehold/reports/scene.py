@@ -1,0 +1,103 @@
+"""The data of the 3-D scene: every mesh once, as base64 typed arrays, and one view for each grasp."""
+
+import base64
+import hashlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError
+from surehold.reports.run_report import Candidate, Scene, SceneMesh
+
+__all__ = ["scene_data"]
+
+_MOST_TRIANGLES = 400_000  # beyond this a page takes long to open on a phone
+
+
+def scene_data(candidates: tuple[Candidate, ...]) -> dict[str, Any] | None:
+    """Return what the page's script draws (JSON-ready), or None if no candidate has a scene.
+
+    Positions are float32 [m], indices uint32, both little-endian and base64; equal arrays are stored once.
+
+    Raises
+    ------
+    InputError
+        If a mesh is malformed (an index without vertex, a number that is not finite) or all meshes together have more
+        than 400,000 triangles.
+    """
+    shown = [(c.label, c.scene) for c in candidates if c.scene is not None]
+    if not shown:
+        return None
+    buffers: dict[str, str] = {}
+    meshes: list[dict[str, Any]] = []
+    known: dict[tuple[Any, ...], int] = {}
+    views = []
+    for label, scene in shown:
+        indices = []
+        for mesh in scene.meshes:
+            vertices = _buffer(buffers, _finite(mesh.vertices, 3, mesh.name).astype("<f4"))
+            faces = _buffer(buffers, _faces(mesh).astype("<u4"))
+            key = (mesh.name, mesh.color, mesh.see_through, vertices, faces)
+            if key not in known:
+                known[key] = len(meshes)
+                meshes.append(dict(zip(("name", "color", "see_through", "vertices", "faces"), key, strict=True)))
+            indices.append(known[key])
+        views.append({"label": label, "meshes": indices, **_marks(scene), "view": list(scene.view)})
+    triangles = sum(len(buffers[m["faces"]]) // 16 for m in meshes)
+    if triangles > _MOST_TRIANGLES:
+        raise InputError(
+            f"the scene has {triangles:,} triangles, more than {_MOST_TRIANGLES:,}; simplify its meshes for the report."
+        )
+    return {"buffers": buffers, "meshes": meshes, "views": views}
+
+
+def _marks(scene: Scene) -> dict[str, Any]:
+    marks: dict[str, Any] = {"contacts": [], "box": None}
+    if scene.contacts is not None:
+        contacts = scene.contacts
+        points, normals = _finite(contacts.points, 3, "contacts"), _finite(contacts.normals, 3, "contact normals")
+        shapes = {len(points), len(normals), len(contacts.friction), len(contacts.weights)}
+        if len(shapes) > 1:
+            raise InputError(
+                f"contacts of the scene have {len(points)} points, {len(normals)} normals, {len(contacts.friction)} "
+                f"friction coefficients and {len(contacts.weights)} weights; give one of each a contact."
+            )
+        marks["contacts"] = [
+            {"p": _round(p), "n": _round(n), "mu": round(float(mu), 4), "w": round(float(w), 4)}
+            for p, n, mu, w in zip(points, normals, contacts.friction, contacts.weights, strict=True)
+        ]
+    if scene.box is not None:
+        marks["box"] = {
+            "center": _round(scene.box.center),
+            "size": _round(scene.box.size),
+            "axes": [_round(axis) for axis in np.asarray(scene.box.rotation).T],
+        }
+    return marks
+
+
+def _round(vector: NDArray[np.float64]) -> list[float]:
+    return [round(float(v), 6) for v in np.asarray(vector)]
+
+
+def _finite(rows: NDArray[np.float64], width: int, name: str) -> NDArray[np.float64]:
+    array = np.asarray(rows, dtype=np.float64).reshape(-1, width) if np.size(rows) == 0 else np.asarray(rows)
+    if array.ndim != 2 or array.shape[1] != width or not np.all(np.isfinite(array)):
+        raise InputError(f"{name} of the scene must be finite numbers of shape (n, {width}); got shape {array.shape}.")
+    return array
+
+
+def _faces(mesh: SceneMesh) -> NDArray[np.int64]:
+    faces = np.asarray(mesh.faces)
+    if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
+        raise InputError(f"faces of mesh '{mesh.name}' must be integers of shape (f, 3); got shape {faces.shape}.")
+    if faces.size and (faces.min() < 0 or faces.max() >= len(mesh.vertices)):
+        raise InputError(f"faces of mesh '{mesh.name}' name vertices that are not there (it has {len(mesh.vertices)}).")
+    return faces
+
+
+def _buffer(buffers: dict[str, str], array: NDArray[Any]) -> str:
+    raw = np.ascontiguousarray(array).tobytes()
+    key = hashlib.sha256(raw).hexdigest()[:12]
+    buffers.setdefault(key, base64.b64encode(raw).decode("ascii"))
+    return key

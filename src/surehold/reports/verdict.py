@@ -1,0 +1,130 @@
+"""The verdict of a run in words, made from its numbers: why the highest peak was refused, or why not."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from surehold.reports.run_report import Candidate, RunReport
+
+__all__ = ["Verdict", "change", "coordinates", "number", "verdict"]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the reader should know first."""
+
+    headline: str  #: one sentence
+    text: str  #: a short paragraph with the numbers
+    refused: bool  #: whether the highest trial was refused for a lower one, and the re-queries bear it out
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a value as people write it: `digits` significant digits, no exponent between 0.0001 and 100,000."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if size < -4 or size >= 5:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa}e{int(exponent)}".replace("-", "−")
+    return f"{value:.{max(digits - 1 - size, 0)}f}".replace("-", "−")
+
+
+def coordinates(report: RunReport, x: np.ndarray) -> str:
+    """Return a point (d,) as `dx = 3.1 mm, rx = 12°`."""
+    parts = []
+    for variable, value in zip(report.variables, x, strict=True):
+        unit = variable.shown_unit
+        space = "" if unit in ("", "°") else " "
+        parts.append(f"{variable.name} = {number(float(value) * variable.factor)}{space}{unit}")
+    return ", ".join(parts)
+
+
+def verdict(report: RunReport) -> Verdict:
+    """Return headline and paragraph for a run."""
+    highest, answer = report.highest, report.recommended
+    name, off = report.quality_name, report.disturbance
+    if highest.values.size == 0 or answer.values.size == 0:
+        if highest.n_failed:
+            why = f"All {highest.n_failed} re-queries with perturbed inputs failed, so the point does not hold at all."
+        else:
+            why = (
+                f"No re-queries with perturbed inputs were made, so nothing is said here about what happens when {off}."
+            )
+        return Verdict(
+            f"The best {name} found is {number(highest.quality)}.",
+            f"It was met at {coordinates(report, highest.x)} ({_trial(highest)} of {report.y.size}). {why}",
+            False,
+        )
+    if len(report.candidates) == 1:
+        return Verdict(
+            f"The highest trial is also the recommended one: {number(answer.quality)} when hit exactly, "
+            f"{number(answer.mean)} on average when {off}.",
+            f"{_sentence(answer, 'The recommended point', name)} The model expects no other trial to hold better.",
+            False,
+        )
+    gap, error = _difference(highest, answer)
+    text = (
+        f"{_sentence(highest, 'The highest point', name)} {_sentence(answer, 'The recommended point', name)} "
+        f"The means differ by {number(gap)} (standard error {number(error, 2)}, both points shaken alike)."
+    )
+    if abs(gap) <= 2.0 * error:
+        headline = (
+            f"When {off}, the highest trial and the recommended one are worth about the same: "
+            f"{number(highest.mean)} and {number(answer.mean)}."
+        )
+        return Verdict(headline, text, False)
+    if gap > 0.0:
+        headline = (
+            f"The highest peak ({number(highest.quality)}) was refused: when {off} it is worth only "
+            f"{number(highest.mean)}, the recommended point {number(answer.mean)}."
+        )
+        return Verdict(headline, text, True)
+    headline = (
+        f"The model preferred a lower point, but the re-queries do not bear it out: when {off} it is worth "
+        f"{number(answer.mean)}, the highest peak {number(highest.mean)}."
+    )
+    text += " More trials near both points would let the model see this."
+    return Verdict(headline, text, False)
+
+
+def _sentence(candidate: Candidate, subject: str, name: str) -> str:
+    n = candidate.values.size
+    text = (
+        f"{subject} ({_trial(candidate)}) reached a {name} of {number(candidate.quality)} when hit exactly. "
+        f"Queried again {n} times with perturbed inputs it gave {number(candidate.mean)} on average ({_change(candidate)}), "
+        f"{number(candidate.worst)} at worst."
+    )
+    half = int(np.sum(candidate.values < 0.5 * candidate.quality)) if candidate.quality > 0.0 else 0
+    if half:
+        text += f" In {half} of {n} it lost more than half."
+    if candidate.n_failed:
+        text += f" {candidate.n_failed} further re-queries gave no value."
+    return text
+
+
+def change(candidate: Candidate) -> str:
+    """Return by how many percent the re-queries' mean differs from the exact value; empty where that says nothing."""
+    if not candidate.quality > 0.0 or not math.isfinite(candidate.mean):
+        return ""
+    share = 100.0 * (candidate.mean / candidate.quality - 1.0)
+    return "unchanged" if abs(share) < 0.5 else f"{share:+.0f}\u00a0%".replace("-", "−")
+
+
+def _change(candidate: Candidate) -> str:
+    return change(candidate) or f"{number(candidate.mean - candidate.quality)} from the exact value"
+
+
+def _difference(highest: Candidate, answer: Candidate) -> tuple[float, float]:
+    """Return the difference of the means and its standard error: paired where both were shaken alike."""
+    gap = answer.mean - highest.mean
+    a, h = answer.values, highest.values
+    if a.size == h.size and a.size > 1 and answer.n_failed == highest.n_failed == 0:
+        return gap, float(np.std(a - h, ddof=1)) / math.sqrt(a.size)
+    return gap, math.hypot(answer.std / math.sqrt(a.size), highest.std / math.sqrt(h.size))
+
+
+def _trial(candidate: Candidate) -> str:
+    return "the model's choice" if candidate.trial is None else f"trial {candidate.trial + 1}"
