@@ -175,13 +175,9 @@ def close_hand(nodes, frame, bases, chains, reach, motion, radius, palm, half, r
             for j in range(last + 1):
                 if moving and not stopped[f, j]:
                     stopped[f, j] = True
-                    angles[f, j] = _joint_angle(
-                        motion[0, f, j], motion[1, f, j], motion[2, f, j], motion[3, f, j], t
-                    )
+                    angles[f, j] = _joint_angle(motion[0, f, j], motion[1, f, j], motion[2, f, j], motion[3, f, j], t)
     for f in range(5):
         for j in range(4):
             if not stopped[f, j]:
-                angles[f, j] = _joint_angle(
-                    motion[0, f, j], motion[1, f, j], motion[2, f, j], motion[3, f, j], closed
-                )
+                angles[f, j] = _joint_angle(motion[0, f, j], motion[1, f, j], motion[2, f, j], motion[3, f, j], closed)
     return angles, touched, looks

@@ -1,7 +1,7 @@
 """One trial: put the open hand at a pose, close it, find the contacts, measure how well they hold the object."""
 
 from dataclasses import dataclass, field
-from typing import Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +26,9 @@ from surehold.grasping.poses import Pose
 from surehold.grasping.synergy import CLOSED, ClosingMotion, power_grasp
 from surehold.grasping.wrench_space import WrenchQuality, wrench_quality
 
+if TYPE_CHECKING:
+    from surehold.grasping.scene import Scene
+
 __all__ = ["QUALITIES", "STATUSES", "Grasp", "Simulator"]
 
 Array = NDArray[np.float64]
@@ -47,7 +50,9 @@ class Grasp:
     quality: float  #: the measure that was asked for; 0 unless the status is "ok"
     pose: Pose  #: from the palm frame to the object's frame
     s1: float  #: posture variable [rad]
-    joints: Array = field(repr=False)  #: (5, 4) joint angles at the end, index to thumb [rad]; a collision leaves it open
+    joints: Array = field(
+        repr=False
+    )  #: (5, 4) joint angles at the end, index to thumb [rad]; a collision leaves it open
     open_joints: Array = field(repr=False)  #: (5, 4) joint angles of the open hand [rad]
     contacts: Contacts = field(repr=False)  #: of the quality; empty after a collision
     touching: tuple[str, ...] = field(repr=False)  #: names of the links that were stopped by the object
@@ -208,14 +213,22 @@ class Simulator:
         joints, touched = self._close(geometry, motion)
         self.gaps(beside, joints, geometry)
         touched[3] = True
-        skin_or_touch = (self._skin(geometry, joints), self._touch(geometry, joints, touched))
-        assert all(rows.shape[1] == 8 for rows in skin_or_touch)
+        self._skin(geometry, joints)
+        self._touch(geometry, joints, touched)
         points = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
         wrench_quality(points, -points, weights=np.ones(4))
 
+    def scene(self, grasp: Grasp, opened: bool = False) -> "Scene":
+        """Return the meshes and contacts of a grasp in the world; with `opened`, of the hand before it closes."""
+        from surehold.grasping.scene import grasp_scene  # pictures stand on grasps, not the other way round
+
+        return grasp_scene(self, grasp, opened)
+
     def _place(self, pose: Pose) -> _Geometry:
         r, p = pose.rotation, np.asarray(pose.position)
-        bases = np.concatenate([r @ self.hand.bases[:, :, :3], (self.hand.bases[:, :, 3] @ r.T + p)[:, :, None]], axis=2)
+        bases = np.concatenate(
+            [r @ self.hand.bases[:, :, :3], (self.hand.bases[:, :, 3] @ r.T + p)[:, :, None]], axis=2
+        )
         palm = np.column_stack([r, r @ self.hand.palm_center + p])
         # The bending axis of a finger is its base's -y; abduction turns it by a few degrees, which is of no matter here.
         return _Geometry(np.ascontiguousarray(bases), palm, np.ascontiguousarray(-bases[:, :, 1]))

@@ -10,6 +10,7 @@ overlap, it is the larger of the two depths, a lower bound of the true depth.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -102,7 +103,7 @@ class Tube:
         corners = np.asarray(self.centerline)
         best = np.full(len(points), np.inf)
         away = np.zeros_like(points)
-        for a, b in zip(corners[:-1], corners[1:], strict=True):
+        for a, b in pairwise(corners):
             edge = b - a
             from_a = points - a
             along = np.clip(from_a @ edge / (edge @ edge), 0.0, 1.0)
@@ -120,7 +121,7 @@ class Tube:
 
         ball = manifold3d.Manifold.sphere(self.radius / _MILLIMETER, 64)
         balls = [ball.translate((np.asarray(c) / _MILLIMETER).tolist()) for c in self.centerline]
-        bars = [manifold3d.Manifold.batch_hull([a, b]) for a, b in zip(balls[:-1], balls[1:], strict=True)]
+        bars = [manifold3d.Manifold.batch_hull([a, b]) for a, b in pairwise(balls)]
         return manifold3d.Manifold.batch_boolean(bars, manifold3d.OpType.Add)
 
 
