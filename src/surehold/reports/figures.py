@@ -176,7 +176,7 @@ def inline_svg(figure: "Figure", name: str, description: str) -> str:
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", text, count=1)
     text = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
-    text = re.sub(r'id="(figure|axes|patch|line2d|text|PathCollection|xtick|ytick)', rf'id="{name}-\1', text)
+    text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", text)
     for css, color in PALETTE.items():
         text = text.replace(color, f"var(--{css})")
     return text.replace("<svg", f'<svg role="img" aria-label="{escape(description)}"', 1)

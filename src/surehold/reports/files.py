@@ -31,7 +31,7 @@ def checked_folder(folder: str | Path) -> Path:
             pass
     except OSError as error:
         raise InputError(
-            f"output folder '{path}' cannot be written ({error.strerror or error}); choose another, with --out for example."
+            f"output folder '{path}' cannot be written ({error.strerror or error}); choose another (--out)."
         ) from None
     return path
 

@@ -94,8 +94,8 @@ def _sentence(candidate: Candidate, subject: str, name: str) -> str:
     n = candidate.values.size
     text = (
         f"{subject} ({_trial(candidate)}) reached a {name} of {number(candidate.quality)} when hit exactly. "
-        f"Queried again {n} times with perturbed inputs it gave {number(candidate.mean)} on average ({_change(candidate)}), "
-        f"{number(candidate.worst)} at worst."
+        f"Queried again {n} times with perturbed inputs it gave {number(candidate.mean)} on average "
+        f"({_change(candidate)}), {number(candidate.worst)} at worst."
     )
     half = int(np.sum(candidate.values < 0.5 * candidate.quality)) if candidate.quality > 0.0 else 0
     if half:

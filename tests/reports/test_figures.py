@@ -1,0 +1,85 @@
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import numpy as np
+
+from surehold.reports import figures
+
+
+def test_every_figure_is_drawn(gm_report, rkhs_report):
+    names = {"overview", "trace", "shake_highest_observed", "shake_recommended", "surface_mean", "surface_unscented"}
+    assert set(figures.figures(gm_report)) == names
+    drawn = set(figures.figures(rkhs_report))
+    assert {"overview", "trace", "surface", "shake_recommended"} <= drawn
+
+
+def test_files_are_valid_and_repeatable(rkhs_report):
+    figure = figures.trace(rkhs_report)
+    text = figures.svg_text(figure, "trace")
+    root = ElementTree.fromstring(text)
+    assert root.tag.endswith("svg")
+    assert text == figures.svg_text(figures.trace(rkhs_report), "trace")
+    assert "highest value so far" in text, "text stays text"
+    png = figures.png_bytes(figure)
+    assert png.startswith(b"\x89PNG")
+    assert png == figures.png_bytes(figures.trace(rkhs_report))
+
+
+def test_inline_figures_follow_the_page(gm_report):
+    text = figures.inline_svg(figures.shake(gm_report, gm_report.highest), "shake", 'what "shaking" does')
+    root = ElementTree.fromstring(text)
+    assert "width" not in root.attrib
+    assert root.attrib["aria-label"] == 'what "shaking" does'
+    assert "var(--ink)" in text
+    assert "var(--high)" in text
+    assert not any(color in text for color in figures.PALETTE.values())
+
+
+def test_the_histogram_counts_every_query(gm_report):
+    for candidate in gm_report.candidates:
+        axes = figures.shake(gm_report, candidate).axes[0]
+        assert sum(bar.get_height() for bar in axes.patches) == candidate.values.size
+    left, right = (figures.shake(gm_report, c).axes[0] for c in gm_report.candidates)
+    assert left.get_xlim() == right.get_xlim()
+    assert left.get_ylim() == right.get_ylim()
+
+
+def test_both_maps_share_their_color_scale(gm_report):
+    view = gm_report.surfaces[0]
+    limits = [figures.surface(gm_report, view, robust).axes[0].images[0].get_clim() for robust in (False, True)]
+    assert limits[0] == limits[1]
+    assert limits[0][1] >= max(view.mean.max(), view.robust_mean.max())
+
+
+def test_the_map_is_not_transposed(gm_report):
+    view = gm_report.surfaces[0]
+    slope = np.add.outer(view.axes[0], 0.0 * view.axes[1])  # grows with the first variable only
+    image = figures.surface(gm_report, replace(view, mean=slope), False).axes[0].images[0]
+    shown = np.asarray(image.get_array())
+    assert np.all(np.diff(shown, axis=1) > 0)
+    assert np.all(np.diff(shown, axis=0) == 0)
+
+
+def test_constant_outcomes_and_awkward_names(rkhs_report):
+    flat = replace(
+        rkhs_report,
+        y=np.zeros(rkhs_report.y.size),
+        best_trace=np.zeros(rkhs_report.y.size),
+        candidates=tuple(replace(c, quality=0.0, values=np.zeros(5)) for c in rkhs_report.candidates),
+        surfaces=tuple(
+            replace(s, mean=0 * s.mean, robust_mean=0 * s.robust_mean, std=0 * s.std) for s in rkhs_report.surfaces
+        ),
+        variables=tuple(replace(v, name="$\\frac{a}") for v in rkhs_report.variables),
+        quality_name="$ <&>",
+    )
+    for name, figure in figures.figures(flat).items():
+        ElementTree.fromstring(figures.svg_text(figure, name))
+
+
+def test_all_failed_but_one(gm_report):
+    y = np.full(gm_report.y.size, np.nan)
+    y[-1] = 1.0
+    best = np.full(y.size, np.nan)
+    best[-1] = 1.0
+    for figure in figures.figures(replace(gm_report, y=y, best_trace=best)).values():
+        assert figures.png_bytes(figure)

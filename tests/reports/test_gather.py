@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+
+import surehold as sh
+from surehold.errors import InputError
+from surehold.problems import GaussianBumps, robust_score
+from surehold.reports import gather
+
+
+def test_answers_and_traces(gm_result, gm_report):
+    labels = gather.answers(gm_result)
+    assert list(labels) == ["highest observed", "recommended"]
+    assert gm_result.y[labels["highest observed"]] == np.max(gm_result.y)
+    np.testing.assert_array_equal(gm_result.X[labels["recommended"]], gm_report.recommended.x)
+    np.testing.assert_array_equal(gm_report.best_trace, np.maximum.accumulate(gm_result.y))
+    assert np.isnan(gm_report.robust_trace[:8]).all()
+    assert gm_report.robust_trace[-1] == gm_result.recommendation.mean == gm_report.recommended.predicted_mean
+    np.testing.assert_allclose(gm_report.noise, 0.01 * np.eye(2))
+
+
+def test_surfaces_are_the_model(gm_result, gm_report):
+    (view,) = gm_report.surfaces
+    corner = np.array([[view.axes[0][7], view.axes[1][50]]])
+    mean, std = gm_result.optimizer.predict(corner)
+    assert view.mean[7, 50] == pytest.approx(mean[0], rel=1e-9)
+    assert view.std[7, 50] == pytest.approx(std[0], rel=1e-6)
+    mean, std = gm_result.optimizer.predict(corner, under_noise=True)
+    assert view.robust_mean[7, 50] == pytest.approx(mean[0], rel=1e-9)
+
+
+def test_three_variables_show_the_two_that_matter():
+    box = sh.Box({"idle": (0.0, 1.0), "a": (-2.0, 2.0), "b": (0.0, 4.0)})
+    wide = np.diag([100.0, 1.0, 1.0])
+    p = GaussianBumps("bump", box, [1.0], [[0.5, 0.0, 2.0]], [wide])
+    noise = sh.InputNoise.unit(0.05)
+    result = sh.maximize(p, box, 26, input_noise=noise, n_initial=20, seed=0)
+    x = result.recommendation.x
+    (view,) = gather.surfaces_of(result.optimizer.posterior, box, noise, x)
+    assert view.variables == (1, 2)
+    assert "a and b" in view.note
+    assert view.axes[0][0] == -2.0
+    point = [[x[0], view.axes[0][10], view.axes[1][30]]]
+    assert view.mean[10, 30] == pytest.approx(result.optimizer.predict(point)[0][0], rel=1e-9)
+
+
+def test_failed_trials_leave_holes():
+    box = sh.Box({"x": (0.0, 1.0)})
+
+    def shaky(x):
+        if x[0] > 0.6:
+            raise RuntimeError("dropped")
+        return float(x[0])
+
+    result = sh.maximize(shaky, box, 10, n_initial=6, seed=1)
+    (label,) = gather.answers(result) or [None]
+    score = robust_score(sh.problems.Function(shaky, box), result.X[result.best_index], sh.InputNoise.unit(0.05))
+    report = gather.report_of(
+        result,
+        [gather.candidate(result, label, result.best_index, score)],
+        title="t",
+        settings={},
+        noise=None,
+    )
+    assert report.failed.any()
+    assert report.best_trace[-1] == np.nanmax(report.y)
+    assert report.robust_trace is None
+    assert report.noise is None
+    with pytest.raises(InputError, match="no variable"):
+        gather.report_of(result, report.candidates, title="t", settings={}, noise=None, units={"y": "m"})

@@ -1,0 +1,139 @@
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from surehold.reports.page import render
+
+VOID = {"meta", "br", "input", "hr", "img", "link"}
+
+
+class Reader(HTMLParser):
+    """Collects text and elements, and checks that elements nest."""
+
+    def __init__(self, page):
+        super().__init__(convert_charrefs=True)
+        self.open, self.elements, self.text, self.scripts = [], [], [], []
+        self.feed(page)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        (self.scripts if self.open and self.open[-1] in ("script", "style") else self.text).append(data)
+
+    def words(self):
+        return re.sub(r"\s+", " ", "".join(self.text))
+
+
+@pytest.fixture(scope="module")
+def gm_page(gm_report):
+    return render(gm_report)
+
+
+def test_the_page_says_what_happened(gm_report, gm_page):
+    words = Reader(gm_page).words()
+    assert "was refused" in words
+    assert "Highest observed refused" in words
+    assert "Recommended holds" in words
+    assert f"{gm_report.highest.mean:.4f}" in words
+    assert f"{gm_report.recommended.mean:.4f}" in words
+    assert "seed 1" in words
+    assert "unscented mean" in words
+    assert words.count("initial") >= 8
+
+
+def test_the_page_needs_nothing_from_outside(gm_page):
+    reader = Reader(gm_page)
+    for tag, attributes in reader.elements:
+        for name in ("src", "href", "xlink:href", "data", "action", "srcset"):
+            value = attributes.get(name)
+            assert value is None or value.startswith(("#", "data:")), f"<{tag} {name}={value[:60]}>"
+        assert tag not in ("link", "iframe", "object", "embed")
+    styles = re.findall(r"<style>(.*?)</style>", gm_page, flags=re.DOTALL)
+    assert not any("@import" in style or "http" in style for style in styles)
+
+
+def test_identifiers_are_unique(gm_page):
+    identifiers = [a["id"] for _, a in Reader(gm_page).elements if "id" in a]
+    assert len(identifiers) == len(set(identifiers))
+
+
+def test_the_scene_is_there_and_can_be_left_out(gm_page, rkhs_report):
+    text = re.search(r'<script type="application/json" id="scene-data">(.*?)</script>', gm_page, flags=re.DOTALL)[1]
+    data = json.loads(text)
+    assert [v["label"] for v in data["views"]] == ["highest observed", "recommended"]
+    assert "4 contacts" in data["views"][0]["note"]
+    assert "Permission is hereby granted" in gm_page, "the license travels with the library"
+    plain = render(rkhs_report)
+    assert "<script" not in plain
+    assert len(plain) < 700_000
+    Reader(plain)
+
+
+def test_user_text_is_escaped(gm_report):
+    evil = "</script><img src=x onerror=alert(1)>&\"'"
+    candidates = tuple(replace(c, pose=evil, status=evil, details={evil: evil}) for c in gm_report.candidates)
+    meshes = tuple(replace(m, name=evil) for m in gm_report.highest.scene.meshes)
+    candidates = (replace(candidates[0], scene=replace(candidates[0].scene, meshes=meshes)), *candidates[1:])
+    variables = (replace(gm_report.variables[0], name=evil), replace(gm_report.variables[1], name="$x_{$"))
+    page = render(
+        replace(
+            gm_report,
+            title=evil,
+            settings={evil: evil},
+            candidates=candidates,
+            variables=variables,
+            quality_name=evil,
+            disturbance=evil,
+            notes=(evil,),
+        )
+    )
+    reader = Reader(page)
+    assert not any(tag == "img" or "onerror" in attributes for tag, attributes in reader.elements)
+    assert sum(tag == "script" for tag, _ in reader.elements) == 3
+    assert "$x_{$" in reader.words()
+
+
+def test_interrupted_and_failed_trials(rkhs_report):
+    y = rkhs_report.y.copy()
+    y[[0, 3]] = np.nan
+    page = render(replace(rkhs_report, y=y, interrupted=True, planned_trials=99))
+    words = Reader(page).words()
+    assert f"interrupted after {y.size} of 99 trials" in words
+    assert "2 failed" in words
+
+
+def test_equal_reports_give_equal_pages(rkhs_report):
+    assert render(rkhs_report) == render(rkhs_report)
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
+def test_a_browser_draws_the_scene(gm_page, tmp_path):
+    (tmp_path / "page.html").write_text(gm_page, encoding="utf-8")
+    flags = ["--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run"]
+    flags += ["--disable-background-networking", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}"]
+    dom = subprocess.run(
+        ["chromium", *flags, "--virtual-time-budget=3000", "--dump-dom", f"file://{tmp_path / 'page.html'}"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    ).stdout
+    assert re.search(r'<canvas[^>]*aria-label="3-D view of the grasp: recommended', dom)
+    assert re.search(r'data-view="1" aria-pressed="true"', dom)

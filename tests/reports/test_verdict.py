@@ -1,0 +1,100 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from surehold.reports.run_report import Candidate, RunReport, Variable
+from surehold.reports.verdict import change, coordinates, number, verdict
+
+
+def report(*candidates, **changes):
+    fields = {
+        "title": "t",
+        "variables": (Variable("dx", -0.05, 0.05, "m"), Variable("rx", -1.0, 1.0, "rad"), Variable("s", 0.0, 1.0)),
+        "X": np.zeros((4, 3)),
+        "y": np.array([1.0, 2.0, 3.0, np.nan]),
+        "n_initial": 2,
+        "best_trace": np.array([1.0, 2.0, 3.0, 3.0]),
+        "candidates": candidates,
+        "settings": {},
+        "seed": 0,
+    }
+    return RunReport(**(fields | changes))
+
+
+def shaken(label, quality, values, trial=1):
+    return Candidate(label, np.array([0.0031, 0.5, 0.25]), quality, trial, np.asarray(values, dtype=float))
+
+
+SPREAD = np.linspace(-1.0, 1.0, 50)
+
+
+def test_the_peak_is_refused_with_its_numbers():
+    told = verdict(
+        report(shaken("highest observed", 3.0, 1.0 + SPREAD), shaken("recommended", 2.0, 1.9 + 0.05 * SPREAD))
+    )
+    assert told.refused
+    assert "refused" in told.headline
+    for part in ("3.00", "1.00", "1.90"):
+        assert part in told.headline
+    assert "In 37 of 50 it lost more than half" in told.text
+    gap = 0.9
+    error = np.std(gap - 0.95 * SPREAD, ddof=1) / np.sqrt(50)
+    assert f"differ by {gap:.3f} (standard error {error:.3f}" in told.text
+
+
+def test_the_answer_that_turns_out_worse_is_said_to_be():
+    told = verdict(
+        report(shaken("highest observed", 3.0, 2.5 + 0.1 * SPREAD), shaken("recommended", 2.0, 1.9 + 0.1 * SPREAD))
+    )
+    assert not told.refused
+    assert "do not bear it out" in told.headline
+
+
+def test_a_difference_within_chance_is_said_to_be():
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(2.0, 1.0, 50), rng.normal(2.0, 1.0, 50)
+    told = verdict(report(shaken("highest observed", 3.0, a), shaken("recommended", 2.9, b)))
+    assert not told.refused
+    assert "about the same" in told.headline
+
+
+def test_one_candidate_and_no_queries():
+    alone = verdict(report(shaken("recommended", 3.0, 2.9 + 0.01 * SPREAD), disturbance="the hand is off"))
+    assert "also the recommended one" in alone.headline
+    assert "when the hand is off" in alone.headline
+    quiet = verdict(report(shaken("recommended", 3.0, [])))
+    assert "No re-queries" in quiet.text
+    assert "dx = 3.10 mm, rx = 28.6°, s = 0.250" in quiet.text
+    lost = verdict(report(replace(shaken("recommended", 3.0, []), n_failed=100)))
+    assert "All 100 re-queries" in lost.text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (0.1356585, "0.136"),
+        (-0.0004321, "−0.000432"),
+        (12.3456, "12.3"),
+        (1234.5, "1234"),
+        (1e12, "1.00e12"),
+        (1.2e-7, "1.20e−7"),
+        (float("nan"), "–"),
+        (None, "–"),
+    ],
+)
+def test_numbers(value, text):
+    assert number(value) == text
+
+
+def test_change():
+    assert change(shaken("a", 2.0, [1.0, 1.0])) == "−50\u00a0%"
+    assert change(shaken("a", 2.0, [2.001, 2.0])) == "unchanged"
+    assert change(shaken("a", 0.0, [1.0])) == ""
+    assert change(shaken("a", -1.0, [1.0])) == ""
+
+
+def test_coordinates_use_readable_units():
+    r = report(shaken("recommended", 1.0, []))
+    assert coordinates(r, np.array([-0.01, np.pi / 2, 1.0])) == "dx = −10.0 mm, rx = 90.0°, s = 1.00"
