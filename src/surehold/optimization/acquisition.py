@@ -21,7 +21,7 @@ from surehold.optimization.criteria import (
     probability_of_improvement,
     upper_confidence_bound,
 )
-from surehold.optimization.quadratures import Quadrature
+from surehold.optimization.robustness import Perturbations
 from surehold.optimization.surrogate import Moments, Posterior
 
 __all__ = ["CRITERIA", "Acquisition", "CriterionName", "criterion_name", "where_to_look"]
@@ -61,8 +61,8 @@ class Acquisition:
         The surrogate, conditioned on the trials.
     name
         Criterion and scale.
-    quadrature
-        Sigma points of the input noise; a single zero offset where the scale is "exact".
+    perturbations
+        Quadrature of the input noise; a single zero offset where the scale is "exact".
     best
         Value of the incumbent on the scale of the criterion: a number, or (m, 1) for one a particle.
     margin
@@ -75,7 +75,7 @@ class Acquisition:
         self,
         posterior: Posterior,
         name: CriterionName,
-        quadrature: Quadrature,
+        perturbations: Perturbations,
         best: float | NDArray[np.float64],
         *,
         margin: float = 0.0,
@@ -83,7 +83,7 @@ class Acquisition:
     ):
         self._posterior = posterior
         self._name = name
-        self._quadrature = quadrature
+        self._perturbations = perturbations
         self._best = best
         self._margin = margin
         self._kappa = kappa
@@ -99,26 +99,28 @@ class Acquisition:
 
     def _evaluate(self, U: NDArray[np.float64], gradient: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         q, d = U.shape
-        offsets, weights = self._quadrature
+        slopes = None
         if self._name.scale == "unscented":
-            points = (U[None, :, :] + offsets[:, None, :]).reshape(-1, d)  # (s q, d)
-            moments = self._posterior.moments(points, gradient)
+            moments, slopes = self._perturbations.spread(self._posterior, U, gradient)  # (m, q s)
+            weights = self._perturbations.quadrature.weights
         else:
-            moments = self._posterior.average(U, offsets, weights, gradient)
+            moments = self._perturbations.outcome(self._posterior, U, gradient)  # (m, q)
             weights = np.ones(1)
         std = np.sqrt(moments.variance)
         c = self._criterion(moments.mean, std)
         m, s = len(std), len(weights)
-        share = np.broadcast_to(weights[None, :, None] / m, (m, s, q))
-        values = c.value.reshape(m, s, q)
+        share = np.broadcast_to(weights / m, (m, q, s))
+        values = c.value.reshape(m, q, s)
         if self._name.base == "log_ei":
             value, factor = _log_of_sum(values, share)
         else:
-            value, factor = (share * values).sum(axis=(0, 1)), share
+            value, factor = (share * values).sum(axis=(0, 2)), share
         if not gradient:
             return value, np.empty((0, d))
-        slope = _slope(moments, std, c).reshape(m, s, q, d)
-        return value, np.einsum("msq,msqd->qd", factor, slope)
+        slope = _slope(moments, std, c).reshape(m, q, s, d)
+        if slopes is not None:
+            slope = slope * slopes
+        return value, np.einsum("mqs,mqsd->qd", factor, slope)
 
     def _criterion(self, mean: NDArray[np.float64], std: NDArray[np.float64]) -> Value:
         if self._name.base == "log_ei":
@@ -142,39 +144,41 @@ def _slope(moments: Moments, std: NDArray[np.float64], c: Value) -> NDArray[np.f
 def _log_of_sum(
     logs: NDArray[np.float64], share: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return log sum share exp(logs) over the first two axes (q,), and its derivative by each log (m, s, q).
+    """Return log sum share exp(logs) over particles and points (q,), and its derivative by each log (m, q, s).
 
     A negative center weight can make the sum negative: the logarithm is then -inf and the derivative 0.
     """
-    top = logs.max(axis=(0, 1))
-    terms = share * np.exp(logs - top)
-    total = terms.sum(axis=(0, 1))
+    top = logs.max(axis=(0, 2))
+    terms = share * np.exp(logs - top[:, None])
+    total = terms.sum(axis=(0, 2))
     positive = total > 0.0
     safe = np.where(positive, total, 1.0)
     value = np.where(positive, top + np.log(safe), -np.inf)
-    return value, np.where(positive, terms / safe, 0.0)
+    return value, np.where(positive[:, None], terms / safe[:, None], 0.0)
 
 
 def where_to_look(
-    posterior: Posterior, u: NDArray[np.float64], quadrature: Quadrature, noise_variance: float = 0.0
+    posterior: Posterior,
+    u: NDArray[np.float64],
+    perturbations: Perturbations,
+    steps: NDArray[np.float64],
+    noise_variance: float = 0.0,
 ) -> NDArray[np.float64]:
     """Return points (c, d) of the cube around u (d,), the one that tells most about g(u) first.
 
-    Trying u itself does not remove the uncertainty about its outcome under input noise. Among u, u + xi_i and
-    u + xi_i / 2 the trial z reduces the variance of g(u) by cov(g(u), f(z))^2 / (var f(z) + noise). The covariance
-    comes from var(g + f) = var g + var f + 2 cov(g, f).
+    Trying u itself does not remove the uncertainty about its outcome under input noise. Among u, u + step and
+    u + step / 2 for the given steps (s, d), the trial z reduces the variance of g(u) by
+    cov(g(u), f(z))^2 / (var f(z) + noise). The covariance comes from var(g + f) = var g + var f + 2 cov(g, f).
     """
-    offsets, weights = quadrature
-    steps = np.concatenate([offsets[:1] * 0.0, offsets[np.any(offsets != 0.0, axis=1)]])
-    steps = np.concatenate([steps, 0.5 * steps[1:]])
-    points = np.clip(u + steps, 0.0, 1.0)
-    variance_g = posterior.average(u[None, :], offsets, weights).variance  # (m, 1)
+    steps = steps[np.any(steps != 0.0, axis=1)]
+    points = np.clip(u + np.concatenate([0.0 * steps[:1], steps, 0.5 * steps]), 0.0, 1.0)
+    offsets = perturbations.around(u[None, :])[0] - u  # (s, d)
+    weights = np.append(perturbations.quadrature.weights, 1.0)
+    variance_g = posterior.average(u[None, :], offsets, weights[:-1]).variance  # (m, 1)
     variance_f = posterior.moments(points).variance  # (m, c)
     gain = np.empty(len(points))
     for i, point in enumerate(points):
-        both = posterior.average(
-            u[None, :], np.concatenate([offsets, (point - u)[None, :]]), np.append(weights, 1.0)
-        ).variance
+        both = posterior.average(u[None, :], np.concatenate([offsets, (point - u)[None, :]]), weights).variance
         covariance = 0.5 * (both[:, 0] - variance_g[:, 0] - variance_f[:, i])
         total = variance_f[:, i] + noise_variance
         gain[i] = np.mean(np.divide(covariance**2, total, out=np.zeros_like(total), where=total > 0.0))

@@ -1,11 +1,11 @@
 """Finding the highest point of an acquisition over the unit cube."""
 
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Found", "direct", "multistart"]
+__all__ = ["Objective", "direct", "multistart"]
 
 _CANDIDATES = 256
 _SCALES = (0.1, 0.03, 0.01, 0.003)  # of the perturbed copies of each anchor, in box widths
@@ -27,20 +27,19 @@ class Objective(Protocol):
         ...
 
 
-class Found(NamedTuple):
-    """Points of the unit cube worth trying, best first."""
-
-    points: NDArray[np.float64]
-    """(c, d)"""
-    values: NDArray[np.float64]
-    """the objective there, (c,)"""
-
-
-def multistart(objective: Objective, dimension: int, anchors: NDArray[np.float64], rng: np.random.Generator) -> Found:
-    """Maximize from a scrambled Sobol sequence and from perturbed copies of the anchors, by gradient ascent.
+def multistart(
+    objective: Objective,
+    screen: Objective,
+    dimension: int,
+    anchors: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Return points (c, d) worth trying, best first: gradient ascents from a Sobol sequence and perturbed anchors.
 
     Parameters
     ----------
+    screen
+        The objective, or a cheaper approximation of it, by which the starts of the ascents are chosen.
     anchors : (a, d)
         Promising points, such as the best trials so far: a narrow peak is found from its flank, hardly by chance.
     """
@@ -51,21 +50,18 @@ def multistart(objective: Objective, dimension: int, anchors: NDArray[np.float64
         noise = scale * rng.standard_normal((_COPIES, *anchors.shape))
         candidates.append(np.clip(anchors + noise, 0.0, 1.0).reshape(-1, dimension))
     points = np.concatenate(candidates)
-    values = objective(points)
-    points, values = _sorted(points, values)
-    refined = [_ascend(objective, start) for start in _spread(points, _STARTS)]
-    return Found(
-        *_sorted(
-            np.concatenate([np.array([point for point, _ in refined]), points]),
-            np.concatenate([np.array([value for _, value in refined]), values]),
-        )
-    )
+    points = points[np.argsort(-screen(points), kind="stable")]
+    ascents = [_ascend(objective, start) for start in _spread(points, _STARTS)]
+    return np.concatenate([_best_first(ascents), points])
 
 
-def direct(objective: Objective, dimension: int, incumbent: NDArray[np.float64], rng: np.random.Generator) -> Found:
-    """Maximize as the thesis does: DIRECT, a local polish, then local trials around the incumbent (d,).
+def direct(
+    objective: Objective, dimension: int, incumbent: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Return points (c, d) worth trying, best first, found as the thesis does.
 
-    500 d evaluations, a tenth of them for the polish (spec of the thesis' programs). The local search is L-BFGS-B.
+    DIRECT with 500 d evaluations, a tenth of them for a local polish, then local trials around the incumbent (d,). The
+    local search is L-BFGS-B.
     """
     from scipy.optimize import direct
 
@@ -78,11 +74,16 @@ def direct(objective: Objective, dimension: int, incumbent: NDArray[np.float64],
         vol_tol=0.0,
         len_tol=0.0,
     )
-    ascended = [_ascend(objective, found.x, budget // 10)]
+    ascents = [_ascend(objective, found.x, budget // 10)]
     for _ in range(_LOCAL_TRIALS):
         start = np.clip(incumbent + _LOCAL_SCALE * rng.standard_normal(dimension), 0.0, 1.0)
-        ascended.append(_ascend(objective, start, budget // 10))
-    return Found(*_sorted(np.array([point for point, _ in ascended]), np.array([value for _, value in ascended])))
+        ascents.append(_ascend(objective, start, budget // 10))
+    return _best_first(ascents)
+
+
+def _best_first(ascents: list[tuple[NDArray[np.float64], float]]) -> NDArray[np.float64]:
+    order = np.argsort([-value for _, value in ascents], kind="stable")
+    return np.array([ascents[i][0] for i in order])
 
 
 def _ascend(
@@ -103,11 +104,6 @@ def _ascend(
         options={"maxfun": evaluations, "maxiter": evaluations},
     )
     return found.x, -float(found.fun)
-
-
-def _sorted(points: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-    order = np.argsort(-values, kind="stable")
-    return points[order], values[order]
 
 
 def _spread(points: NDArray[np.float64], count: int, distance: float = 0.02) -> list[NDArray[np.float64]]:

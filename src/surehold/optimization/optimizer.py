@@ -3,7 +3,7 @@
 Legend
     u        point of the unit cube (d,); x the same point in the box's units
     n        finished trials that gave a value
-    outcome  UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over particles j and sigma points i     thesis (3.21)
+    outcome  UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over particles j and perturbations xi_i     thesis (3.21)
 """
 
 from dataclasses import dataclass
@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.optimization import acquisition, maximizer
+from surehold.optimization import acquisition, maximizer, quadratures
 from surehold.optimization.box import Box
 from surehold.optimization.designs import design as initial_design
 from surehold.optimization.gaussian_process import GaussianProcess
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.presets import thesis_preset
-from surehold.optimization.quadratures import exact, quasi_monte_carlo, sigma_points
+from surehold.optimization.quadratures import exact
+from surehold.optimization.robustness import Perturbations
 from surehold.optimization.surrogate import Posterior, Surrogate, mixture
 from surehold.optimization.threads import single_threaded
 
@@ -28,6 +29,7 @@ __all__ = ["Optimizer", "Recommendation"]
 SURROGATES: Final = ("gp",)
 _SEPARATION: Final = 1e-6  # points closer than this in every coordinate of the unit cube are the same trial
 _ANCHORS: Final = 3
+_SHORTLIST: Final = 16
 _QUANTILE: Final = 0.05
 
 
@@ -77,8 +79,14 @@ class Optimizer:
         Observation noise of "gp": "none" (default), its standard deviation in the outputs' units, or "inferred".
     output_range
         (lowest, highest) value to expect, if known.
+    quadrature
+        How the input noise is averaged over: "unscented" (default of the criteria averaged over sigma points),
+        "scaled_unscented", "central_difference", "gauss_hermite" or "quasi_monte_carlo" (default of the robust ones).
     k
         Free parameter of the unscented transformation.
+    border
+        What happens to perturbed points outside the box: "extend" (default) evaluates the model there, "clip" moves
+        them to the border, "keep" gives a coordinate that would leave its noise-free value.
     kappa
         Standard deviations added by the "ucb" criteria.
     preset
@@ -103,7 +111,9 @@ class Optimizer:
         seed: int = 0,
         noise: float | Literal["none", "inferred"] = "none",
         output_range: tuple[float, float] | None = None,
+        quadrature: str | None = None,
         k: float = 1.0,
+        border: str = "extend",
         kappa: float = 2.0,
         preset: str | None = None,
     ):
@@ -133,10 +143,13 @@ class Optimizer:
             if self._criterion.scale != "exact":
                 raise InputError(f"criterion '{criterion}' averages over input noise; give input_noise= as well.")
             self._covariance = np.zeros((box.dimension, box.dimension))
-            self._quadrature = exact(box.dimension)
+            rule = exact(box.dimension)
         else:
             self._covariance = input_noise.unit_covariance(box)
-            self._quadrature = sigma_points(self._covariance, k)
+            default = "quasi_monte_carlo" if self._criterion.scale == "robust" else "unscented"
+            rule = quadratures.quadrature(quadrature or default, self._covariance, k)
+        self._perturbations = Perturbations(rule, border)
+        self._sigma_points = Perturbations(quadratures.sigma_points(self._covariance), border)
         if not np.isfinite(kappa):
             raise InputError(f"kappa is {kappa!r}; give a finite number of standard deviations.")
         self._kappa = float(kappa)
@@ -239,20 +252,24 @@ class Optimizer:
         best, anchors = self._incumbent(posterior)
         if self._pending:
             posterior = posterior.with_pending(np.array(self._pending))
-        objective = acquisition.Acquisition(
-            posterior,
-            self._criterion,
-            self._quadrature,
-            best,
-            margin=0.0 if self._thesis is None else self._thesis.margin,
-            kappa=self._kappa,
-        )
+
+        def objective(perturbations: Perturbations) -> acquisition.Acquisition:
+            margin = 0.0 if self._thesis is None else self._thesis.margin
+            return acquisition.Acquisition(
+                posterior, self._criterion, perturbations, best, margin=margin, kappa=self._kappa
+            )
+
+        dimension = self.box.dimension
+        if self._criterion.scale == "exact":
+            accurate = screen = objective(Perturbations(exact(dimension)))
+        else:
+            accurate, screen = objective(self._perturbations), objective(self._sigma_points)
         if self._thesis is not None:
-            return maximizer.direct(objective, self.box.dimension, anchors[0], rng).points[0]
-        found = maximizer.multistart(objective, self.box.dimension, anchors, rng)
-        points = found.points
+            return maximizer.direct(accurate, dimension, anchors[0], rng)[0]
+        points = maximizer.multistart(accurate, screen, dimension, anchors, rng)
         if self._criterion.scale == "robust":
-            looks = acquisition.where_to_look(posterior, points[0], self._quadrature)
+            steps = self._sigma_points.quadrature.offsets
+            looks = acquisition.where_to_look(posterior, points[0], self._perturbations, steps)
             points = np.concatenate([looks, points])
         if self._noisy:
             return points[0]
@@ -274,10 +291,10 @@ class Optimizer:
         """
         with single_threaded():
             posterior = self._posterior()
-            index = int(np.argmax(self._outcomes(posterior)))
+            index = int(self._ranking(posterior)[0])
             u = self._inputs[self._successful][index]
-            spread = quasi_monte_carlo(self._covariance, 7)
-            moments = posterior.moments(u + spread.offsets)
+            reached = Perturbations(quadratures.quasi_monte_carlo(self._covariance, 7), self._perturbations.border)
+            moments, _ = reached.spread(posterior, u[None, :])
             mean, variance = mixture(moments)
             quantile = _mixture_quantile(moments.mean.ravel(), np.sqrt(moments.variance).ravel(), _QUANTILE)
         return Recommendation(
@@ -292,12 +309,12 @@ class Optimizer:
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the model's mean and standard deviation (q,) at X (q, d) in the box's units.
 
-        With `under_noise`, of the outcome averaged over the sigma points of the input noise instead.
+        With `under_noise`, of the outcome averaged over the input noise instead.
         """
         U = np.atleast_2d(self.box.to_unit(X))
         with single_threaded():
-            quadrature = self._quadrature if under_noise else exact(self.box.dimension)
-            mean, variance = mixture(self._posterior().average(U, *quadrature))
+            perturbations = self._perturbations if under_noise else Perturbations(exact(self.box.dimension))
+            mean, variance = mixture(perturbations.outcome(self._posterior(), U))
         return mean, np.sqrt(variance)
 
     @property
@@ -328,25 +345,31 @@ class Optimizer:
         self._cache = (len(values), posterior)
         return posterior
 
-    def _outcomes(self, posterior: Posterior) -> NDArray[np.float64]:
-        """Return UO (n,) at the tried inputs that gave a value."""
-        return posterior.average(self._inputs[self._successful], *self._quadrature).mean.mean(axis=0)
+    def _ranking(self, posterior: Posterior) -> NDArray[np.intp]:
+        """Return the tried inputs that gave a value, as indices among them, best outcome under the noise first.
+
+        All are ranked by sigma points; where the rule has more points, it ranks the first of them again.
+        """
+        tried = self._inputs[self._successful]
+        first = self._perturbations if self._thesis is not None else self._sigma_points
+        order = np.argsort(-first.outcome(posterior, tried).mean.mean(axis=0), kind="stable")
+        top = order[:_SHORTLIST]
+        outcomes = self._perturbations.outcome(posterior, tried[top]).mean.mean(axis=0)
+        order[:_SHORTLIST] = top[np.argsort(-outcomes, kind="stable")]
+        return order
 
     def _incumbent(self, posterior: Posterior) -> tuple[Any, NDArray[np.float64]]:
         """Return the value to improve upon, on the criterion's scale, and the best tried inputs (a, d)."""
         tried = self._inputs[self._successful]
         observed = self.y[self._successful]
-        by_particle = posterior.average(tried, *self._quadrature).mean  # (m, n)
-        outcomes = by_particle.mean(axis=0)
-        order = np.argsort(-outcomes, kind="stable")
-        anchors = tried[order[:_ANCHORS]]
+        anchors = tried[self._ranking(posterior)[:_ANCHORS]]
         if self._thesis is not None:  # the original improves upon the best observed value inside UEI too
             return float(observed.max()), anchors
-        if self._criterion.scale == "robust":
-            return by_particle[:, order[:1]], anchors
-        if self._criterion.scale == "exact" and not self._noisy:
-            return float(observed.max()), anchors
-        return float(outcomes.max()), anchors
+        if self._criterion.scale == "exact":
+            values = mixture(posterior.moments(tried))[0] if self._noisy else observed
+            return float(values.max()), tried[np.argsort(-values, kind="stable")[:_ANCHORS]]
+        best = self._perturbations.outcome(posterior, anchors[:1]).mean  # (m, 1)
+        return best if self._criterion.scale == "robust" else float(best.mean()), anchors
 
     def _rng(self, purpose: int, position: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, purpose, position])

@@ -155,7 +155,7 @@ def gauss_hermite(covariance: ArrayLike, order: int = 3) -> Quadrature:
     return Quadrature(offsets, product / product.sum())
 
 
-def quasi_monte_carlo(covariance: ArrayLike, exponent: int = 6) -> Quadrature:
+def quasi_monte_carlo(covariance: ArrayLike, exponent: int = 5) -> Quadrature:
     """Return 2**exponent equally weighted quasi-random points of N(0, covariance): a shifted Sobol sequence.
 
     For spread and quantiles, which a handful of sigma points cannot give. Points come in pairs of opposite sign, so
@@ -196,6 +196,6 @@ def _root(covariance: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.float64],
     if not np.allclose(part, part.T, rtol=1e-10, atol=0.0):
         raise InputError("covariance is not symmetric; entry (i, j) must equal entry (j, i).")
     try:
-        return noisy, np.linalg.cholesky(part), len(S)
+        return noisy, np.linalg.cholesky(part).astype(np.float64), len(S)
     except np.linalg.LinAlgError:
         raise InputError("covariance is not positive definite; check its variances and correlations.") from None

@@ -1,0 +1,69 @@
+"""Where a commanded input may end up: a quadrature of the input noise, and the rule at the border of the box.
+
+Legend
+    U        queries in the unit cube, (q, d)
+    offsets  perturbations xi_i, (s, d), or (q, s, d) where the border makes them differ from query to query
+    weights  w_i, (s,), summing to 1
+    g(x)     outcome under the input noise, E f(x + noise), about sum_i w_i f(x + xi_i)      [UO, thesis (3.21)]
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import unknown_name
+from surehold.optimization.quadratures import Quadrature
+from surehold.optimization.surrogate import Moments, Posterior
+
+__all__ = ["BORDERS", "Perturbations"]
+
+BORDERS: Final = ("extend", "clip", "keep")
+
+
+@dataclass(frozen=True)
+class Perturbations:
+    """Weighted perturbations of an input, and what happens to those that leave the box.
+
+    The rule at the border: "extend" lets the model be evaluated outside the box; "clip" moves a coordinate that left
+    back to the border; "keep" gives it its noise-free value, as the thesis scores its runs.
+    """
+
+    quadrature: Quadrature
+    border: str = "extend"
+
+    def __post_init__(self) -> None:
+        if self.border not in BORDERS:
+            raise unknown_name("border rule", self.border, BORDERS)
+
+    def around(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the perturbed points (q, s, d) of U (q, d)."""
+        offsets, _ = self._at(U)
+        return U[:, None, :] + offsets
+
+    def outcome(self, posterior: Posterior, U: NDArray[np.float64], gradient: bool = False) -> Moments:
+        """Return the moments of g at U (q, d) under each particle."""
+        offsets, slopes = self._at(U)
+        return posterior.average(U, offsets, self.quadrature.weights, gradient, slopes)
+
+    def spread(
+        self, posterior: Posterior, U: NDArray[np.float64], gradient: bool = False
+    ) -> tuple[Moments, NDArray[np.float64] | None]:
+        """Return the moments of f at all perturbed points, query by query: (m, q s); and slopes (q, s, d)."""
+        offsets, slopes = self._at(U)
+        points = U[:, None, :] + offsets
+        return posterior.moments(points.reshape(-1, U.shape[1]), gradient), slopes
+
+    def _at(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """Return offsets, and the derivative of each perturbed coordinate by the query's (None: 1 everywhere)."""
+        offsets = self.quadrature.offsets
+        if self.border == "extend":
+            return offsets, None
+        points = U[:, None, :] + offsets
+        inside = (points >= 0.0) & (points <= 1.0)
+        if inside.all():
+            return offsets, None
+        if self.border == "keep":
+            return np.where(inside, offsets, 0.0), None
+        return np.clip(points, 0.0, 1.0) - U[:, None, :], inside.astype(np.float64)
