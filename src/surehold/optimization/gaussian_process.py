@@ -8,9 +8,9 @@ Legend (the thesis' symbols in brackets)
     mean_j     k_j' A_j^-1 y                                                                   thesis (3.5)
     variance_j k_j(x, x) - k_j' A_j^-1 k_j                                                     thesis (3.6)
 
-A weighted sum of function values, sum_i w_i f(x + xi_i), is itself Gaussian under each particle: its covariance with the
-data is sum_i w_i k_j(x + xi_i, X) and its prior variance sum_ij w_i w_j k_j(xi_i, xi_j). With one offset of 0 that is
-f(x) itself, so one compiled function serves both.
+A weighted sum of function values, sum_i w_i f(x + xi_i), is itself Gaussian under each particle: its covariance with
+the data is sum_i w_i k_j(x + xi_i, X) and its prior variance sum_ij w_i w_j k_j(xi_i, xi_j). With one offset of 0 that
+is f(x) itself, so one compiled function serves both.
 """
 
 from math import log, sqrt
@@ -144,6 +144,45 @@ def _average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kerne
     return mean, np.maximum(variance, 0.0), mean_gradient, variance_gradient
 
 
+@njit(cache=True)
+def _sample(P, normals, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha):
+    """Return joint draws (m, q, b, s) of f at the points P (q, s, d), from standard normals (b, s)."""
+    m, n = alpha.shape
+    q, s, _ = P.shape
+    draws = np.empty((m, q, normals.shape[0], s))
+    K = np.empty((n, s))
+    C = np.empty((s, s))
+    for j in range(m):
+        for i in range(q):
+            cross_correlation(kernel, X, P[i], inverse_l[j], K)
+            for a in range(n):
+                for w in range(s):
+                    K[a, w] = s2[j] * K[a, w] + mean_variance
+            V = np.dot(inverse_L[j], K)
+            cross_correlation(kernel, P[i], P[i], inverse_l[j], C)
+            for w in range(s):
+                for o in range(s):
+                    C[w, o] = s2[j] * C[w, o] + mean_variance
+            C -= np.dot(V.T, V)
+            nugget = 1e-10 * (s2[j] + mean_variance)
+            root = C.copy()
+            while True:
+                for w in range(s):
+                    root[w, w] = C[w, w] + nugget
+                if cholesky(root):
+                    break
+                root[:] = C
+                nugget *= 10.0
+            mean = np.dot(alpha[j], K)
+            for b in range(normals.shape[0]):
+                for w in range(s):
+                    t = mean[w]
+                    for o in range(w + 1):
+                        t += root[w, o] * normals[b, o]
+                    draws[j, i, b, w] = t
+    return draws
+
+
 class Hyperparameters(NamedTuple):
     """The particles, unpacked."""
 
@@ -246,6 +285,21 @@ class GaussianProcessPosterior:
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of f at queries (q, d)."""
         return self.average(queries, np.zeros((1, queries.shape[1])), np.ones(1), gradient)
+
+    def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
+        draws = _sample(
+            np.ascontiguousarray(points),
+            np.ascontiguousarray(normals),
+            self.evidence.X,
+            self.hyperparameters.inverse_l,
+            self.hyperparameters.s2,
+            self.evidence.mean_variance,
+            self.evidence.kernel,
+            self._inverse_L,
+            self._alpha,
+        )
+        return self.outputs.shift + self.outputs.scale * draws
 
     def with_pending(self, X: NDArray[np.float64]) -> "GaussianProcessPosterior":
         """Return the posterior as if each particle's own mean had been observed at X (k, d): only variances shrink."""

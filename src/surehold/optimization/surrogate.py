@@ -64,6 +64,10 @@ class Posterior(Protocol):
         """Return the moments of f at each query."""
         ...
 
+    def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
+        ...
+
     def with_pending(self, X: NDArray[np.float64]) -> "Posterior":
         """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
         ...
