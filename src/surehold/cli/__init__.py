@@ -1,0 +1,46 @@
+"""The command line: commands, progress and tables; no logic of its own."""
+
+import sys
+from collections.abc import Sequence
+
+__all__ = ["main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit: 0 done, 1 nothing came of it, 2 bad input, 130 interrupted with nothing to keep.
+
+    Every expected error is one line on the standard error stream.
+    """
+    sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command line and return its exit code."""
+    import typer
+    from typer import exceptions
+
+    from surehold.cli.application import application
+    from surehold.errors import InputError, SureholdError
+
+    try:
+        code = typer.main.get_command(application())(args=arguments, prog_name="surehold", standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except typer.Exit as end:
+        return end.exit_code
+    except exceptions.TyperException as error:
+        format_message = getattr(error, "format_message", None)
+        _say(format_message() if format_message else str(error))
+        return int(getattr(error, "exit_code", 2))
+    except InputError as error:
+        _say(str(error))
+        return 2
+    except SureholdError as error:
+        _say(str(error))
+        return 1
+    except (KeyboardInterrupt, typer.Abort):
+        _say("interrupted before any trial gave a value; there is nothing to keep.")
+        return 130
+
+
+def _say(message: str) -> None:
+    print(f"error: {' '.join(message.split())}", file=sys.stderr)  # noqa: T201

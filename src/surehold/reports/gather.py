@@ -1,7 +1,7 @@
 """From a finished run to the data of its report: candidates, traces, and the model over one or two variables."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,23 @@ from surehold.optimization.maximization import Result
 from surehold.optimization.quadratures import sigma_points
 from surehold.optimization.surrogate import Posterior, mixture
 from surehold.problems.perturbation import RobustScore
-from surehold.reports.run_report import Candidate, RunReport, Scene, Surface, Variable
+from surehold.reports.run_report import (
+    Candidate,
+    ContactSet,
+    ObjectBox,
+    RunReport,
+    Scene,
+    SceneMesh,
+    Surface,
+    Variable,
+)
 
-__all__ = ["answers", "candidate", "report_of", "surfaces_of"]
+if TYPE_CHECKING:
+    from surehold.grasping.scene import Scene as GraspScene
 
+__all__ = ["answers", "candidate", "grasp_scene", "report_of", "surfaces_of"]
+
+_OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
 _LINE, _SQUARE = 301, 61  # grid points along a line, and along each side of a square
 
 
@@ -121,6 +134,20 @@ def report_of(
         planned_trials=planned_trials,
         notes=tuple(notes),
     )
+
+
+def grasp_scene(scene: "GraspScene") -> Scene:
+    """Return a grasp's scene as the page draws it: the object see-through, the links that touch in another color."""
+    object_mesh = SceneMesh("object", scene.object.vertices, scene.object.faces, _OBJECT, see_through=True)
+    touching = set(scene.bodies)
+    hand = [
+        SceneMesh(mesh.name, mesh.vertices, mesh.faces, _TOUCHING if mesh.name in touching else _HAND)
+        for mesh in scene.hand
+    ]
+    friction = np.full(len(scene.points), float(scene.friction))
+    contacts = ContactSet(scene.points, scene.normals, friction, scene.weights)
+    box = ObjectBox(scene.box_center, 2.0 * scene.box_half_extents, scene.box_axes)
+    return Scene((object_mesh, *hand), contacts, box)
 
 
 def surfaces_of(

@@ -11,7 +11,7 @@ from surehold.reports.run_report import Candidate, RunReport, Surface
 from surehold.reports.scene import scene_data
 from surehold.reports.verdict import change, coordinates, number, verdict
 
-__all__ = ["render"]
+__all__ = ["render", "table_rows"]
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
 
@@ -58,7 +58,7 @@ def render(report: RunReport) -> str:
         scene_script=Markup((_TEMPLATES / "scene.js").read_text(encoding="utf-8")),
         maps=[_map(report, view, i) for i, view in enumerate(report.surfaces)],
         trace=Markup(figures.inline_svg(figures.trace(report), "trace", "Best and robust value by trial")),
-        rows=_rows(report),
+        rows=table_rows(report),
         settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
         trials=_trials(report),
     )
@@ -102,7 +102,7 @@ def _card(report: RunReport, candidate: Candidate, refused: bool) -> dict[str, A
         "title": label["text"],
         "tag": tag,
         "tag_class": "no" if tag == "refused" else "yes",
-        "where": candidate.pose or coordinates(report, candidate.x),
+        "where": coordinates(report, candidate.x),
         "quality": number(candidate.quality),
         "mean": number(candidate.mean) if shaken else "",
         "worst": number(candidate.worst),
@@ -162,7 +162,8 @@ def _map(report: RunReport, view: Surface, index: int) -> dict[str, Any]:
     }
 
 
-def _rows(report: RunReport) -> list[tuple[str, list[str]]]:
+def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
+    """Return what is known of the candidates, line by line: the name and one cell for each candidate."""
     every = report.candidates
 
     def row(name: str, cell: Any) -> tuple[str, list[str]]:

@@ -14,7 +14,7 @@ from surehold.errors import InputError
 
 __all__ = ["Candidate", "ContactSet", "ObjectBox", "RunReport", "Scene", "SceneMesh", "Surface", "Variable"]
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class SceneMesh:
 
     name: str
     vertices: Floats  #: (v, 3) [m]
-    faces: NDArray[np.int64]  #: (f, 3) indices into the vertices
+    faces: NDArray[np.integer]  #: (f, 3) indices into the vertices
     color: str = "#8a93a3"  #: CSS hexadecimal
     see_through: bool = False  #: drawn half transparent on request, so that contacts inside are seen
 

@@ -76,18 +76,18 @@ def _marks(scene: Scene) -> dict[str, Any]:
     return marks
 
 
-def _round(vector: NDArray[np.float64]) -> list[float]:
+def _round(vector: NDArray[np.floating]) -> list[float]:
     return [round(float(v), 6) for v in np.asarray(vector)]
 
 
-def _finite(rows: NDArray[np.float64], width: int, name: str) -> NDArray[np.float64]:
+def _finite(rows: NDArray[np.floating], width: int, name: str) -> NDArray[np.floating]:
     array = np.asarray(rows, dtype=np.float64).reshape(-1, width) if np.size(rows) == 0 else np.asarray(rows)
     if array.ndim != 2 or array.shape[1] != width or not np.all(np.isfinite(array)):
         raise InputError(f"{name} of the scene must be finite numbers of shape (n, {width}); got shape {array.shape}.")
     return array
 
 
-def _faces(mesh: SceneMesh) -> NDArray[np.int64]:
+def _faces(mesh: SceneMesh) -> NDArray[np.integer]:
     faces = np.asarray(mesh.faces)
     if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
         raise InputError(f"faces of mesh '{mesh.name}' must be integers of shape (f, 3); got shape {faces.shape}.")

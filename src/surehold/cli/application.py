@@ -1,0 +1,36 @@
+"""The command `surehold` and its subcommands."""
+
+import typer
+
+from surehold import __version__
+from surehold.cli.doctor import doctor
+from surehold.cli.grasp import grasp
+from surehold.cli.maximize import maximize
+
+__all__ = ["application"]
+
+
+def application() -> typer.Typer:
+    """Return the command with everything below it."""
+    app = typer.Typer(
+        name="surehold",
+        help="Find, in few trials, the optimum that still holds when the input is off.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.command()(grasp)
+    app.command()(maximize)
+    app.command()(doctor)
+
+    @app.callback()
+    def version(
+        show: bool = typer.Option(False, "--version", help="Show the version and exit.", is_eager=True),
+    ) -> None:
+        if show:
+            typer.echo(f"surehold {__version__}")
+            raise typer.Exit()
+
+    return app

@@ -1,0 +1,44 @@
+"""Say so, once, when numerical kernels are being compiled: the only long wait that has nothing to show."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+
+__all__ = ["announced", "warm_up"]
+
+
+@contextmanager
+def announced(console: Console) -> Iterator[None]:
+    """Run the block; if a kernel is compiled in it, announce that before the first and report the time at the end."""
+    from numba.core import event
+
+    class Watcher(event.Listener):
+        started: float | None = None
+
+        def on_start(self, event: Any) -> None:
+            if self.started is None:
+                self.started = time.perf_counter()
+                console.print("Compiling numerical kernels, once for this installation (under half a minute) ...")
+
+        def on_end(self, event: Any) -> None: ...
+
+    watcher = Watcher()
+    with event.install_listener("numba:compile", watcher):
+        yield
+    if watcher.started is not None:
+        console.print(f"Compiled and stored in {time.perf_counter() - watcher.started:.1f} s.")
+
+
+def warm_up(problem: Any, settings: dict[str, Any]) -> None:
+    """Run a few trials of a trivial problem with the same settings, and the problem's own warm-up if it has one."""
+    from surehold.optimization.maximization import maximize
+
+    own: Callable[[], Any] | None = getattr(problem, "warm_up", None)
+    if own is not None:
+        own()
+    few = {**settings, "n_initial": 4}
+    center = problem.box.from_unit([0.5] * problem.box.dimension)
+    maximize(lambda x: -float(sum(((x - center) / problem.box.widths) ** 2)), problem.box, 6, **few)

@@ -1,0 +1,89 @@
+"""`surehold doctor`: what is installed, where caches lie, what is compiled, and whether pictures can be rendered."""
+
+import importlib
+import os
+import pkgutil
+import platform
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+__all__ = ["doctor"]
+
+REQUIRED = ("numpy", "scipy", "numba", "trimesh", "manifold3d", "matplotlib", "jinja2", "typer", "rich", "PyYAML")
+OPTIONAL = {
+    "libigl": "distances to your own meshes",
+    "mujoco": "other hands, physics as the second opinion",
+    "optuna": "storage, workers and dashboard",
+    "scikit-learn": "estimators in its style",
+}
+KERNELS = ("surehold.optimization", "surehold.grasping")
+
+
+def doctor() -> None:
+    """Show versions, caches, compiled kernels and graphics libraries."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from surehold import __version__
+
+    table = Table(show_edge=False, pad_edge=False, show_header=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    table.add_row("surehold", __version__)
+    table.add_row("Python", f"{platform.python_version()} on {platform.platform()}")
+    table.add_row("cores", str(os.cpu_count()))
+    for name in REQUIRED:
+        table.add_row(name, version_of(name) or "MISSING: reinstall with pip install surehold")
+    for name, use in OPTIONAL.items():
+        table.add_row(name, version_of(name) or f"not installed; optional, for {use}")
+    compiled, total = compiled_kernels()
+    table.add_row("compiled kernels", f"{compiled} of {total} are in the cache; others are compiled when first used")
+    table.add_row("kernel cache", ", ".join(sorted({str(p) for p in kernel_folders()})) or "none")
+    for name, found in graphics_libraries().items():
+        table.add_row(name, found or "not found; only needed for still pictures by MuJoCo")
+    Console(highlight=False).print(table)
+
+
+def version_of(name: str) -> str | None:
+    """Return the installed version of a distribution, or None."""
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def compiled_kernels() -> tuple[int, int]:
+    """Return how many of the project's kernels have compiled code in the cache, and how many there are."""
+    indices = [index for index, _ in _kernels()]
+    return sum(index.is_file() for index in indices), len(indices)
+
+
+def kernel_folders() -> set[Path]:
+    """Return the folders that hold compiled kernels."""
+    return {folder for _, folder in _kernels()}
+
+
+def graphics_libraries() -> dict[str, str | None]:
+    """Return EGL, OSMesa and OpenGL with the names of the libraries found."""
+    from ctypes.util import find_library
+
+    return {name: find_library(name) for name in ("EGL", "OSMesa", "GL")}
+
+
+def _kernels() -> Iterator[tuple[Path, Path]]:
+    """Yield the index file and the cache folder of every kernel."""
+    from numba.core.registry import CPUDispatcher
+
+    seen: set[int] = set()
+    for package in KERNELS:
+        for info in pkgutil.iter_modules(importlib.import_module(package).__path__, f"{package}."):
+            module = importlib.import_module(info.name)
+            for value in vars(module).values():
+                if isinstance(value, CPUDispatcher) and id(value) not in seen:
+                    seen.add(id(value))
+                    cache: Any = getattr(value, "_cache", None)
+                    file = getattr(cache, "_cache_file", None)
+                    if file is not None:  # a kernel with cache=True
+                        yield Path(file._index_path), Path(cache.cache_path)

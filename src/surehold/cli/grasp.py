@@ -1,0 +1,116 @@
+"""`surehold grasp OBJECT`: find a grasp that still holds when the hand is off."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from surehold.cli.options import Initial, Method, Noise, Open, Out, Preset, Seed, Trials, checked_method, noise_of
+
+__all__ = ["grasp"]
+
+
+def grasp(
+    obj: Annotated[str, typer.Argument(metavar="OBJECT", help="mug, bottle, glass or drill.")],
+    facet: Annotated[
+        str, typer.Option(help="The facet that the palm faces, then the one at the thumb.")
+    ] = "right-front",
+    variables: Annotated[str, typer.Option(help="Free variables, of dx,dy,dz,rx,ry,rz,s1.")] = "dx,dy",
+    contact: Annotated[str, typer.Option(help="single, patch or graded (soft touch).")] = "graded",
+    quality: Annotated[str, typer.Option(help="epsilon or volume.")] = "epsilon",
+    method: Method = "ubo",
+    trials: Trials = 100,
+    initial: Initial = 40,
+    noise: Noise = "0.03",
+    seed: Seed = 0,
+    preset: Preset = "",
+    out: Out = "",
+    open_report: Open = False,
+) -> None:
+    """Find a grasp that still holds when the hand is off."""
+    checked_method(method)
+    input_noise = noise_of(noise or "none", method)
+
+    from surehold.cli.compilation import announced
+    from surehold.cli.session import Console, folder_for, run_session
+    from surehold.problems.grasp import Grasp
+    from surehold.reports import gather
+    from surehold.reports.run_report import Candidate, RunReport
+
+    console = Console(highlight=False)
+    names = tuple(name.strip() for name in variables.split(",") if name.strip())
+    with announced(console):
+        problem = Grasp(obj, facet, names, contact=contact, quality=quality)
+    folder = folder_for(f"{problem.object.name} {facet}", method, seed, out)
+
+    def describe(candidate: Candidate) -> Candidate:
+        outcome = problem.grasp(candidate.x)
+        position = ", ".join(f"{1000 * p:.1f}" for p in outcome.pose.position)
+        turn = ", ".join(f"{q:.3f}" for q in outcome.pose.quaternion)
+        return replace(
+            candidate,
+            status=outcome.status,
+            pose=f"palm at ({position}) mm, quaternion ({turn}), s1 = {outcome.s1:.2f} rad",
+            details={"contacts": str(len(outcome.contacts)), "touching": ", ".join(outcome.touching) or "nothing"},
+            scene=gather.grasp_scene(problem.simulator.scene(outcome)),
+        )
+
+    def also_write(report: RunReport, folder: Path) -> None:
+        write_grasps(problem, report, folder / "grasps.yaml")
+
+    run_session(
+        problem,
+        title=f"Grasp the {problem.object.name} from the {facet}",
+        method=method,
+        noise=input_noise,
+        trials=trials or 100,
+        initial=initial or 40,
+        seed=seed,
+        preset=preset,
+        folder=folder,
+        open_report=open_report,
+        settings={
+            "object": problem.object.name,
+            "facet": facet,
+            "variables": ", ".join(problem.box.names),
+            "hand": problem.simulator.hand.name,
+            "contact": contact,
+            "quality": quality,
+            "friction": problem.simulator.friction,
+            "input noise": noise,
+        },
+        describe=describe,
+        also_write=also_write,
+        units=dict(zip(problem.box.names, problem.units, strict=True)),
+        quality_name=f"quality ({quality})",
+        disturbance="the hand is off",
+        console=console,
+    )
+
+
+def write_grasps(problem: Any, report: Any, path: Path) -> None:
+    """Write the candidates of a report as an Isaac grasp file."""
+    from surehold.grasping.formats import StoredGrasp, write_isaac_grasps
+    from surehold.grasping.hand import FINGERS, LINKS
+
+    def joints(angles: Any) -> dict[str, float]:
+        return {
+            f"{finger}_{link}": float(angles[f, k]) for f, finger in enumerate(FINGERS) for k, link in enumerate(LINKS)
+        }
+
+    stored = []
+    for candidate in report.candidates:
+        outcome = problem.grasp(candidate.x)
+        worth = candidate.mean if candidate.values.size else candidate.quality
+        stored.append(
+            StoredGrasp(
+                candidate.label.replace(" ", "_"),
+                min(max(float(worth), 0.0), 1.0),
+                outcome.pose.position,
+                outcome.pose.quaternion,
+                joints(outcome.joints),
+                joints(outcome.open_joints),
+            )
+        )
+    write_isaac_grasps(path, stored, problem.object.name, problem.simulator.hand.name)

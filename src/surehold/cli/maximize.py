@@ -1,0 +1,97 @@
+"""`surehold maximize PROBLEM`: a synthetic function or the user's own."""
+
+from typing import Annotated, Any, NamedTuple
+
+import typer
+
+from surehold.cli.options import Initial, Method, Noise, Open, Out, Preset, Seed, Trials, checked_method, noise_of
+
+__all__ = ["maximize"]
+
+
+class Defaults(NamedTuple):
+    """What a problem is run with when the user says nothing."""
+
+    trials: int
+    initial: int | None
+    """None: as the optimizer chooses"""
+    noise: str
+
+
+DEFAULTS = {
+    "rkhs": Defaults(50, 5, "0.01"),
+    "gm": Defaults(120, 30, "0.1"),
+    "gf": Defaults(60, 20, "0.03"),
+    "gf-stretched": Defaults(60, 20, "0.03"),
+}
+OWN = Defaults(60, None, "0.03")
+
+
+def maximize(
+    problem: Annotated[
+        str, typer.Argument(help="rkhs, gm, gf, gf-stretched; or package.module:function or path/file.py:function.")
+    ],
+    bounds: Annotated[
+        str,
+        typer.Option(help="Bounds of your own function, NAME=LOWER:UPPER,...", show_default=False),
+    ] = "",
+    method: Method = "ubo",
+    trials: Trials = None,
+    initial: Initial = None,
+    noise: Noise = None,
+    seed: Seed = 0,
+    preset: Preset = "",
+    out: Out = "",
+    open_report: Open = False,
+) -> None:
+    """Find a maximum that still holds when the input is off."""
+    checked_method(method)
+    chosen = problem_of(problem, bounds)
+    defaults = DEFAULTS.get(problem, OWN)
+    noise_text = defaults.noise if noise is None else noise
+    input_noise = noise_of(noise_text, method)
+
+    from surehold.cli.session import folder_for, run_session
+    from surehold.optimization.optimizer import Optimizer
+
+    budget = defaults.trials if trials is None else trials
+    start = initial
+    if start is None:
+        start = min(defaults.initial or Optimizer.default_n_initial(chosen.box), budget)
+    run_session(
+        chosen,
+        title=f"Maximize {chosen.name}",
+        method=method,
+        noise=input_noise,
+        trials=budget,
+        initial=start,
+        seed=seed,
+        preset=preset,
+        folder=folder_for(chosen.name, method, seed, out),
+        open_report=open_report,
+        settings={"problem": problem, "bounds": bounds or None, "input noise": noise_text},
+    )
+
+
+def problem_of(text: str, bounds: str) -> Any:
+    """Return the synthetic function of that name, or the user's own function within its bounds.
+
+    Raises
+    ------
+    InputError
+        If the name or the reference is wrong, bounds are missing, or bounds are given for a synthetic function.
+    """
+    from surehold.errors import InputError, unknown_name
+    from surehold.problems.function import Function, load_function, parse_bounds
+    from surehold.problems.synthetic import SYNTHETIC, synthetic_function
+
+    if ":" not in text:
+        if text not in SYNTHETIC:
+            raise unknown_name("problem", text, [*SYNTHETIC, "package.module:function", "path/file.py:function"])
+        if bounds:
+            raise InputError(f"problem '{text}' has its own bounds; leave --bounds out.")
+        return synthetic_function(text)
+    if not bounds:
+        raise InputError(f"--bounds are missing for {text!r}; give for example --bounds dx=-0.05:0.05,dy=0:1.")
+    box = parse_bounds(bounds)
+    return Function(load_function(text), box, text.rpartition(":")[2])
