@@ -3,12 +3,16 @@
     d       gap between a sample of the hand's skin and the object, m
     delta   depth of the soft touch, m
     w       weight of a contact, 1 - d / delta, in (0, 1]
+    rho     thickness of the skin, m; m is a sample's outward normal on the hand, x its place
 
 `single`   one contact for each link that touches: the point of the object nearest to the link. What is touched can
            switch from one side of an edge to the other, so the quality is rough in the pose.
 `patch`    every skin sample within delta is a contact of full weight; on and off as samples enter and leave.
 `graded`   every skin sample within delta is a contact of weight w: continuous in pose and joint angles, because
            a contact fades in and out. The skin is sampled at fixed places of each link and of the palm.
+
+Point and normal of a skin contact are those of the object's surface nearest to x - rho m, below the skin: bare x would
+see the normal turn over at once where it passes a sharp edge, a skin of thickness rho rolls over it.
 """
 
 from dataclasses import dataclass, field
@@ -26,6 +30,7 @@ __all__ = ["CONTACT_MODELS", "DEPTH", "Contacts", "as_contacts", "skin_contacts"
 
 CONTACT_MODELS: Final = ("graded", "patch", "single")
 DEPTH: Final = 0.003  #: depth of the soft touch, delta [m]
+SKIN: Final = 0.002  #: thickness of the skin, rho [m]
 STATIONS: Final = 5  #: rings of samples along a link
 AROUND: Final = 8  #: samples on a ring
 PALM_PITCH: Final = 0.008  #: largest distance between samples of the palm [m]
@@ -51,7 +56,7 @@ class Contacts:
 
 @njit(cache=True)
 def _put(rows, n, nodes, frame, x, y, z, weight, body):
-    """Write the contact below the point x, y, z into row n: point (3), inward normal (3), weight, body."""
+    """Write the contact nearest to the point x, y, z into row n: point (3), inward normal (3), weight, body."""
     d, gx, gy, gz = field_distance_gradient(nodes, frame, x, y, z)
     norm = np.sqrt(gx * gx + gy * gy + gz * gz)
     if norm < 1e-6:  # exactly between two surfaces: there is no nearest one
@@ -78,16 +83,73 @@ def touch_contacts(nodes, frame, ends, touched, radius):
 
 
 @njit(cache=True)
-def skin_contacts(nodes, frame, ends, sides, radius, palm, half, rounding, depth, stations, around, pitch, graded):
+def link_samples(radius, length, round_end, stations, around):
+    """Return skin samples (m, 6) of a link along z: place, outward normal. `round_end` adds the far end's half ball.
+
+    A ring of `around` samples at the middle of each of `stations` equal pieces; on the half ball two rings and the tip.
+    """
+    rows = np.empty((stations * around + (around + around // 2 + 1 if round_end else 0), 6))
+    n = 0
+    for s in range(stations + (3 if round_end else 0)):
+        latitude = 0.0 if s < stations else np.pi / 6.0 * (s - stations + 1)
+        height = length * (s + 0.5) / stations if s < stations else length
+        count = around if latitude < 0.9 else (around // 2 if latitude < 1.3 else 1)
+        for a in range(count):
+            angle = 2.0 * np.pi * a / count
+            rows[n, 3] = np.cos(latitude) * np.cos(angle)
+            rows[n, 4] = np.cos(latitude) * np.sin(angle)
+            rows[n, 5] = np.sin(latitude)
+            rows[n, 0], rows[n, 1] = radius * rows[n, 3], radius * rows[n, 4]
+            rows[n, 2] = height + radius * rows[n, 5]
+            n += 1
+    return rows
+
+
+@njit(cache=True)
+def palm_samples(half, rounding, pitch):
+    """Return skin samples (m, 6) of the flat inner face of the palm, in its box's frame: place and outward normal."""
+    n1 = int(np.ceil(2.0 * (half[0] - rounding) / pitch)) + 1
+    n2 = int(np.ceil(2.0 * (half[1] - rounding) / pitch)) + 1
+    rows = np.zeros((n1 * n2, 6))
+    for i in range(n1):
+        for j in range(n2):
+            row = rows[i * n2 + j]
+            row[0] = (half[0] - rounding) * (2.0 * i / (n1 - 1) - 1.0)
+            row[1] = (half[1] - rounding) * (2.0 * j / (n2 - 1) - 1.0)
+            row[2], row[5] = half[2], 1.0
+    return rows
+
+
+@njit(cache=True)
+def _skin(rows, n, nodes, frame, pose, samples, depth, skin, graded, body):
+    """Add the contacts of one body's samples; `pose` (3, 4) carries them to the object's frame."""
+    for i in range(samples.shape[0]):
+        s = samples[i]
+        x = pose[0, 0] * s[0] + pose[0, 1] * s[1] + pose[0, 2] * s[2] + pose[0, 3]
+        y = pose[1, 0] * s[0] + pose[1, 1] * s[1] + pose[1, 2] * s[2] + pose[1, 3]
+        z = pose[2, 0] * s[0] + pose[2, 1] * s[1] + pose[2, 2] * s[2] + pose[2, 3]
+        d = field_distance(nodes, frame, x, y, z)
+        if d < depth:
+            x -= skin * (pose[0, 0] * s[3] + pose[0, 1] * s[4] + pose[0, 2] * s[5])
+            y -= skin * (pose[1, 0] * s[3] + pose[1, 1] * s[4] + pose[1, 2] * s[5])
+            z -= skin * (pose[2, 0] * s[3] + pose[2, 1] * s[4] + pose[2, 2] * s[5])
+            weight = min(1.0 - d / depth, 1.0) if graded else 1.0
+            n = _put(rows, n, nodes, frame, x, y, z, weight, body)
+    return n
+
+
+@njit(cache=True)
+def skin_contacts(
+    nodes, frame, ends, sides, radius, palm, half, rounding, depth, skin, stations, around, pitch, graded
+):
     """Return contacts (c, 8) of all skin samples nearer than `depth`: point, inward normal, weight, body.
 
     `sides` (5, 3) is the bending axis of each finger: the samples of a ring are counted from it.
     """
-    n1 = int(np.ceil(2.0 * half[0] / pitch)) + 1
-    n2 = int(np.ceil(2.0 * half[1] / pitch)) + 1
-    rows = np.empty((20 * (stations * around + 1) + n1 * n2, 8))
+    flat = palm_samples(half, rounding, pitch)
+    rows = np.empty((20 * (stations + 2) * around + flat.shape[0], 8))
+    pose = np.empty((3, 4))
     n = 0
-    normal, third = np.empty(3), np.empty(3)
     for body in range(20):
         near, far = ends[body, 0], ends[body, 1]
         axis = far - near
@@ -99,47 +161,18 @@ def skin_contacts(nodes, frame, ends, sides, radius, palm, half, rounding, depth
         lean = (side[0] * axis[0] + side[1] * axis[1] + side[2] * axis[2]) / length**2
         size = 0.0
         for i in range(3):
-            normal[i] = side[i] - lean * axis[i]
-            size += normal[i] ** 2
+            pose[i, 0] = side[i] - lean * axis[i]
+            size += pose[i, 0] ** 2
+            pose[i, 2] = axis[i] / length
+            pose[i, 3] = near[i]
         for i in range(3):
-            normal[i] /= np.sqrt(size)
+            pose[i, 0] /= np.sqrt(size)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            third[i] = (axis[j] * normal[k] - axis[k] * normal[j]) / length
-        # One ring at each of the stations; the distal link's round end has one more sample, its tip.
-        for s in range(stations):
-            share = (s + 0.5) / stations
-            for a in range(around):
-                angle = 2.0 * np.pi * a / around
-                c, e = radius * np.cos(angle), radius * np.sin(angle)
-                x = near[0] + share * axis[0] + c * normal[0] + e * third[0]
-                y = near[1] + share * axis[1] + c * normal[1] + e * third[1]
-                z = near[2] + share * axis[2] + c * normal[2] + e * third[2]
-                d = field_distance(nodes, frame, x, y, z)
-                if d < depth:
-                    weight = min(1.0 - d / depth, 1.0) if graded else 1.0
-                    n = _put(rows, n, nodes, frame, x, y, z, weight, body)
-        if body % 4 == 3:
-            x = far[0] + radius / length * axis[0]
-            y = far[1] + radius / length * axis[1]
-            z = far[2] + radius / length * axis[2]
-            d = field_distance(nodes, frame, x, y, z)
-            if d < depth:
-                weight = min(1.0 - d / depth, 1.0) if graded else 1.0
-                n = _put(rows, n, nodes, frame, x, y, z, weight, body)
-    # The palm: the flat part of its inner face.
-    h1, h2 = half[0] - rounding, half[1] - rounding
-    for i in range(n1):
-        u = h1 * (2.0 * i / (n1 - 1) - 1.0)
-        for j in range(n2):
-            v = h2 * (2.0 * j / (n2 - 1) - 1.0)
-            x = palm[0, 3] + u * palm[0, 0] + v * palm[0, 1] + half[2] * palm[0, 2]
-            y = palm[1, 3] + u * palm[1, 0] + v * palm[1, 1] + half[2] * palm[1, 2]
-            z = palm[2, 3] + u * palm[2, 0] + v * palm[2, 1] + half[2] * palm[2, 2]
-            d = field_distance(nodes, frame, x, y, z)
-            if d < depth:
-                weight = min(1.0 - d / depth, 1.0) if graded else 1.0
-                n = _put(rows, n, nodes, frame, x, y, z, weight, PALM)
+            pose[i, 1] = pose[j, 2] * pose[k, 0] - pose[k, 2] * pose[j, 0]
+        samples = link_samples(radius, length, body % 4 == 3, stations, around)
+        n = _skin(rows, n, nodes, frame, pose, samples, depth, skin, graded, body)
+    n = _skin(rows, n, nodes, frame, palm, flat, depth, skin, graded, PALM)
     return rows[:n]
 
 

@@ -29,7 +29,7 @@ __all__ = ["DistanceField", "cache_folder", "distance_field", "field_distance", 
 
 CELL: Final = 0.001  #: edge of a grid cell [m]
 MARGIN: Final = 0.012  #: how far the grid reaches beyond the object: finger radius + soft-touch depth, and slack [m]
-_FORMAT = 1  #: part of the content hash: a change of the layout must not find an old file
+_FORMAT = 2  #: part of the content hash: a change of the layout must not find an old file
 _CHUNK = 200_000
 
 
@@ -101,11 +101,16 @@ def _compute(obj: GraspObject, frame: NDArray[np.float64], shape: NDArray[np.int
 
 
 def _mesh_distance(obj: GraspObject, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    import igl
+    try:
+        import igl
+    except ImportError as error:
+        raise InputError(
+            f"object '{obj.name}' is a mesh of its own, whose distances libigl computes; pip install libigl."
+        ) from error
 
-    faces = obj.faces.astype(np.int64)
     kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
-    distance, _, closest, _ = igl.signed_distance(points, obj.vertices, faces, sign_type=kind)
+    result = igl.signed_distance(points, obj.vertices, obj.faces.astype(np.int64), sign_type=kind)
+    distance, closest = np.asarray(result[0], dtype=np.float64), np.asarray(result[2], dtype=np.float64)
     away = points - closest
     length = np.linalg.norm(away, axis=1)
     gradient = away * (np.where(distance < 0.0, -1.0, 1.0) / np.where(length > 0.0, length, 1.0))[:, None]

@@ -13,6 +13,7 @@ from surehold.grasping.contacts import (
     CONTACT_MODELS,
     DEPTH,
     PALM_PITCH,
+    SKIN,
     STATIONS,
     Contacts,
     as_contacts,
@@ -20,7 +21,7 @@ from surehold.grasping.contacts import (
     touch_contacts,
 )
 from surehold.grasping.distance_field import DistanceField, distance_field
-from surehold.grasping.hand import PALM, Hand, hand_named, link_name
+from surehold.grasping.hand import Hand, hand_named, link_name
 from surehold.grasping.meshes import GraspObject, shipped_object
 from surehold.grasping.poses import Pose
 from surehold.grasping.synergy import CLOSED, ClosingMotion, power_grasp
@@ -35,8 +36,8 @@ Array = NDArray[np.float64]
 Status = Literal["ok", "no contact", "initial collision", "not closed"]
 
 QUALITIES: Final = ("epsilon", "volume")
-#: What became of a trial. "ok": force closure. "no contact": fewer than two contacts. "initial collision": the open hand
-#: is inside the object. "not closed": contacts that do not resist every wrench. All but "ok" have quality 0.
+#: What became of a trial. "ok": force closure. "no contact": fewer than two contacts. "initial collision": the open
+#: hand is inside the object. "not closed": contacts that do not resist every wrench. All but "ok" have quality 0.
 STATUSES: Final = ("ok", "no contact", "initial collision", "not closed")
 
 _NO_CONTACTS: Final = as_contacts(np.empty((0, 8)))
@@ -90,7 +91,7 @@ class Simulator:
     depth
         Depth of the soft touch [m].
     object_pose
-        From the object's frame to the world, in which `grasp` takes poses; the world is the object's frame if not given.
+        From the object's frame to the world in which `grasp` takes poses; if not given, the world is that frame.
 
     Raises
     ------
@@ -230,7 +231,7 @@ class Simulator:
             [r @ self.hand.bases[:, :, :3], (self.hand.bases[:, :, 3] @ r.T + p)[:, :, None]], axis=2
         )
         palm = np.column_stack([r, r @ self.hand.palm_center + p])
-        # The bending axis of a finger is its base's -y; abduction turns it by a few degrees, which is of no matter here.
+        # A finger bends about its base's -y; that abduction turns it by a few degrees is of no matter here.
         return _Geometry(np.ascontiguousarray(bases), palm, np.ascontiguousarray(-bases[:, :, 1]))
 
     def _close(self, geometry: _Geometry, motion: ClosingMotion) -> tuple[Array, NDArray[np.bool_]]:
@@ -270,6 +271,7 @@ class Simulator:
             self.hand.palm_half_extents,
             self.hand.palm_rounding,
             self.depth,
+            SKIN,
             STATIONS,
             AROUND,
             PALM_PITCH,

@@ -58,8 +58,8 @@ _BUILDERS: dict[str, tuple[Callable[[], tuple[Solid, ...]], float]] = {}
 
 def _mug() -> tuple[Solid, ...]:
     """Stoneware: 80 mm wide, 95 mm high, wall 4 mm, bottom 6 mm, a round bar of 11 mm as handle towards the back."""
-    outer, inner, height, bottom = 0.040, 0.036, 0.095, 0.006
-    cup = RevolvedProfile(((0.0, 0.0), (outer, 0.0), (outer, height), (inner, height), (inner, bottom), (0.0, bottom)))
+    outer, inner, height, bottom, edge = 0.040, 0.036, 0.095, 0.006, 0.0019
+    cup = RevolvedProfile(_cup(outer, outer, inner, inner, height, bottom, edge), edge)
     bar = 0.0055
     turn = np.linspace(0.0, np.pi, 21)
     reach = inner + bar + 0.030 * np.sin(turn) ** 0.8  # the ends are tangent to the inner wall, not beyond it
@@ -68,38 +68,53 @@ def _mug() -> tuple[Solid, ...]:
 
 
 def _bottle() -> tuple[Solid, ...]:
-    """A full half-liter-class water bottle: 52.5 mm wide, 160 mm high, shoulder from 105 mm, cap of 13 mm."""
-    body, cap = 0.02625, 0.0065
-    shoulder = [
-        (cap + (body - cap) * 0.5 * (1.0 + np.cos(s * np.pi)), 0.105 + 0.030 * s) for s in np.linspace(0.0, 1.0, 13)
-    ]
-    corners = [(0.0, 0.0), (body - 0.002, 0.0), (body, 0.002), *shoulder, (cap, 0.160), (0.0, 0.160)]
-    return (RevolvedProfile(tuple((float(r), float(z)) for r, z in corners)),)
+    """A full small water bottle: 52.5 mm wide, 160 mm high, shoulder from 95 to 125 mm, cap of 13 mm."""
+    body, cap, height, edge = 0.02625, 0.0065, 0.160, 0.002
+    fall = np.linspace(0.0, 1.0, 13)
+    shoulder = np.column_stack([cap + (body - cap) * 0.5 * (1.0 + np.cos(fall * np.pi)), 0.095 + 0.030 * fall])
+    shoulder -= edge * np.array([1.0, 0.0])
+    corners = [(0.0, edge), (body - edge, edge), *shoulder.tolist(), (cap - edge, height - edge), (0.0, height - edge)]
+    return (RevolvedProfile(tuple((float(r), float(z)) for r, z in corners), edge),)
 
 
 def _glass() -> tuple[Solid, ...]:
-    """A tall drinking glass: 71 mm wide at the rim, 57 mm at the foot, 159 mm high, wall 2 mm, bottom 8 mm."""
-    foot, rim, height, wall, bottom = 0.0285, 0.0355, 0.159, 0.002, 0.008
-    inner_foot = foot + (rim - foot) * bottom / height - wall
-    corners = ((0.0, 0.0), (foot, 0.0), (rim, height), (rim - wall, height), (inner_foot, bottom), (0.0, bottom))
-    return (RevolvedProfile(corners),)
+    """A tall drinking glass: 71 mm wide at the rim, 57 mm at the foot, 159 mm high, wall 2.4 mm, bottom 8 mm."""
+    foot, rim, height, wall, bottom = 0.0285, 0.0355, 0.159, 0.0024, 0.008
+    return (RevolvedProfile(_cup(foot, rim, foot - wall, rim - wall, height, bottom, 0.0011), 0.0011),)
 
 
 def _drill() -> tuple[Solid, ...]:
     """A cordless drill of 190 x 60 x 180 mm: motor housing along x, chuck in front, tilted grip, battery below."""
     housing = RevolvedProfile(
-        ((0.0, -0.075), (0.026, -0.075), (0.030, -0.070), (0.030, 0.030), (0.024, 0.050), (0.0, 0.050)),
+        ((0.0, -0.073), (0.024, -0.073), (0.028, -0.068), (0.028, 0.028), (0.022, 0.048), (0.0, 0.048)),
+        0.002,
         origin=(0.0, 0.0, 0.150),
         axis="x",
     )
     chuck = RevolvedProfile(
-        ((0.0, 0.045), (0.019, 0.045), (0.019, 0.080), (0.010, 0.100), (0.006, 0.115), (0.0, 0.115)),
+        ((0.0, 0.045), (0.018, 0.045), (0.018, 0.080), (0.009, 0.100), (0.005, 0.114), (0.0, 0.114)),
+        0.001,
         origin=(0.0, 0.0, 0.150),
         axis="x",
     )
     grip = RoundedBox((-0.028, 0.0, 0.083), (0.021, 0.0165, 0.070), 0.012, tilt=0.20)
     battery = RoundedBox((-0.030, 0.0, 0.020), (0.045, 0.030, 0.020), 0.006)
     return housing, chuck, grip, battery
+
+
+def _cup(
+    foot: float, rim: float, inner_foot: float, inner_rim: float, height: float, bottom: float, edge: float
+) -> tuple[tuple[float, float], ...]:
+    """Return the profile of a cup, smaller by `edge` all around: it is grown by that again, with round edges."""
+    slope = (inner_rim - inner_foot) / height
+    return (
+        (0.0, edge),
+        (foot - edge, edge),
+        (rim - edge, height - edge),
+        (inner_rim + edge, height - edge),
+        (inner_foot + slope * bottom + edge, bottom - edge),
+        (0.0, bottom - edge),
+    )
 
 
 _BUILDERS.update(mug=(_mug, 2300.0), bottle=(_bottle, 1000.0), glass=(_glass, 2500.0), drill=(_drill, 1100.0))

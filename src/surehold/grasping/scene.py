@@ -95,7 +95,9 @@ def _capsule(
     height = np.where(np.arange(2 * _CAP) < _CAP, 0.0, length) + radius * np.sin(latitude)
     turn = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
     ring = np.column_stack([np.cos(turn), np.sin(turn)])
-    rings = [np.column_stack([radius * np.cos(a) * ring, np.full(_AROUND, h)]) for a, h in zip(latitude, height)]
+    rings = [
+        np.column_stack([radius * np.cos(a) * ring, np.full(_AROUND, h)]) for a, h in zip(latitude, height, strict=True)
+    ]
     local = np.vstack([*rings, [[0.0, 0.0, -radius], [0.0, 0.0, length + radius]]])
     return near + local @ frame.T, _ring_faces(2 * _CAP, _AROUND)
 
@@ -122,6 +124,7 @@ def _rounded_box(half: NDArray[np.float64], rounding: float) -> tuple[NDArray[np
     latitude = np.linspace(-np.pi / 2.0, np.pi / 2.0, rings + 2)[1:-1]
     lat, lon = np.repeat(latitude, around), np.tile(turn, rings)
     unit = np.column_stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
-    unit = np.vstack([unit, [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]])
+    poles = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
+    unit: NDArray[np.float64] = np.vstack([unit, poles])
     apart = np.where(np.abs(unit) < 1e-12, 0.0, np.sign(unit)) * core
     return rounding * unit + apart, _ring_faces(rings, around)

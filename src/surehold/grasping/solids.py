@@ -1,4 +1,4 @@
-"""Solids with an exact distance: revolved profiles, bent tubes and boxes, and unions of them.
+"""Solids with an exact distance: revolved profiles, bent bars and boxes, and unions of them.
 
     x    a point, (3,), m                    d(x)   signed distance, m: negative inside, positive outside
     g    gradient of d, unit length, (3,)    c(x)   the closest point of the surface, c = x - d g
@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Ball", "RevolvedProfile", "RoundedBox", "Solid", "Tube", "signed_distance", "triangles"]
+__all__ = ["RevolvedProfile", "RoundedBox", "Solid", "Tube", "signed_distance", "triangles"]
 
 _MILLIMETER = 1e-3
 _CHORDS = 128  #: facets around a full turn; a circle of 40 mm radius is then met within 0.012 mm
@@ -31,6 +31,10 @@ class Solid(Protocol):
         """Return the signed distance (n,) and its gradient (n, 3) at points (n, 3) [m]."""
         ...
 
+    def bounding_ball(self) -> tuple[Array, float]:
+        """Return center (3,) and radius [m] of a ball that holds the solid."""
+        ...
+
     def manifold(self) -> Any:
         """Return the solid as a `manifold3d.Manifold` in millimeters."""
         ...
@@ -38,9 +42,10 @@ class Solid(Protocol):
 
 @dataclass(frozen=True)
 class RevolvedProfile:
-    """A polygon in the half plane (radius, height), turned about an axis."""
+    """A polygon in the half plane (radius, height), grown by a rounding, and turned about an axis."""
 
     profile: tuple[tuple[float, float], ...]  #: corners (radius >= 0, height) [m], counterclockwise
+    rounding: float  #: by how much the polygon is grown: the radius of its convex corners [m]
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: where radius and height are zero [m]
     axis: str = "z"  #: the axis of revolution: "x" or "z"
 
@@ -51,10 +56,19 @@ class RevolvedProfile:
             local = np.roll(local, -1, axis=1)  # (x, y, z) -> (y, z, x): a rotation
         radius = np.hypot(local[:, 0], local[:, 1])
         distance, gradient = self._in_plane(radius, local[:, 2])
+        distance -= self.rounding
         safe = np.where(radius > 0.0, radius, 1.0)
         outward = np.where(radius > 0.0, gradient[:, 0], 0.0)
         g = np.column_stack([outward * local[:, 0] / safe, outward * local[:, 1] / safe, gradient[:, 1]])
         return distance, np.roll(g, 1, axis=1) if self.axis == "x" else g
+
+    def bounding_ball(self) -> tuple[Array, float]:
+        """Return center (3,) and radius [m] of a ball that holds the solid."""
+        corners = np.asarray(self.profile)
+        middle = 0.5 * (corners[:, 1].min() + corners[:, 1].max())
+        along = np.eye(3)[0 if self.axis == "x" else 2]
+        radius = float(np.hypot(corners[:, 0], corners[:, 1] - middle).max()) + self.rounding
+        return np.asarray(self.origin) + middle * along, radius
 
     def _in_plane(self, r: Array, z: Array) -> tuple[Array, Array]:
         corners = np.asarray(self.profile)
@@ -84,8 +98,9 @@ class RevolvedProfile:
         """Return the solid as a `manifold3d.Manifold` in millimeters."""
         import manifold3d
 
-        corners = np.asarray(self.profile) / _MILLIMETER
-        body = manifold3d.Manifold.revolve(manifold3d.CrossSection([corners]), _CHORDS)
+        core = manifold3d.CrossSection([np.asarray(self.profile) / _MILLIMETER])
+        whole = core.offset(self.rounding / _MILLIMETER, manifold3d.JoinType.Round, circular_segments=48)
+        body = manifold3d.Manifold.revolve(whole, _CHORDS)  # what the growth put beyond the axis is cut off
         if self.axis == "x":
             body = body.rotate([0.0, 90.0, 0.0])
         return body.translate((np.asarray(self.origin) / _MILLIMETER).tolist())
@@ -115,6 +130,12 @@ class Tube:
         distance = np.sqrt(best)
         return distance - self.radius, away / np.where(distance > 0.0, distance, 1.0)[:, None]
 
+    def bounding_ball(self) -> tuple[Array, float]:
+        """Return center (3,) and radius [m] of a ball that holds the solid."""
+        corners = np.asarray(self.centerline)
+        center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        return center, float(np.linalg.norm(corners - center, axis=1).max()) + self.radius
+
     def manifold(self) -> Any:
         """Return the solid as a `manifold3d.Manifold` in millimeters."""
         import manifold3d
@@ -123,27 +144,6 @@ class Tube:
         balls = [ball.translate((np.asarray(c) / _MILLIMETER).tolist()) for c in self.centerline]
         bars = [manifold3d.Manifold.batch_hull([a, b]) for a, b in pairwise(balls)]
         return manifold3d.Manifold.batch_boolean(bars, manifold3d.OpType.Add)
-
-
-@dataclass(frozen=True)
-class Ball:
-    """A ball."""
-
-    center: tuple[float, float, float]  #: m
-    radius: float  #: m
-
-    def signed_distance(self, points: Array) -> tuple[Array, Array]:
-        """Return the signed distance (n,) and its gradient (n, 3) at points (n, 3) [m]."""
-        away = points - np.asarray(self.center)
-        distance = np.linalg.norm(away, axis=1)
-        return distance - self.radius, away / np.where(distance > 0.0, distance, 1.0)[:, None]
-
-    def manifold(self) -> Any:
-        """Return the solid as a `manifold3d.Manifold` in millimeters."""
-        import manifold3d
-
-        ball = manifold3d.Manifold.sphere(self.radius / _MILLIMETER, _CHORDS)
-        return ball.translate((np.asarray(self.center) / _MILLIMETER).tolist())
 
 
 @dataclass(frozen=True)
@@ -170,6 +170,10 @@ class RoundedBox:
         distance = np.where(within, over[np.arange(len(over)), deepest], outside) - self.rounding
         return distance, (g * np.where(local < 0.0, -1.0, 1.0)) @ turn.T
 
+    def bounding_ball(self) -> tuple[Array, float]:
+        """Return center (3,) and radius [m] of a ball that holds the solid."""
+        return np.asarray(self.center), float(np.linalg.norm(self.half_extents))
+
     def _turn(self) -> Array:
         c, s = np.cos(self.tilt), np.sin(self.tilt)
         return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
@@ -190,10 +194,12 @@ def signed_distance(solids: Sequence[Solid], points: Array) -> tuple[Array, Arra
     """Return the signed distance (n,) of the union of the solids and its gradient (n, 3) at points (n, 3) [m]."""
     distance, gradient = solids[0].signed_distance(points)
     for solid in solids[1:]:
-        d, g = solid.signed_distance(points)
-        closer = d < distance
-        distance = np.where(closer, d, distance)
-        gradient = np.where(closer[:, None], g, gradient)
+        center, radius = solid.bounding_ball()
+        near = np.flatnonzero(np.linalg.norm(points - center, axis=1) - radius < distance)
+        d, g = solid.signed_distance(points[near])
+        closer = d < distance[near]
+        distance[near[closer]] = d[closer]
+        gradient[near[closer]] = g[closer]
     return distance, gradient
 
 

@@ -1,7 +1,7 @@
 """Where a grasp starts from: the distance of the hand and the opposition of the thumb, found by a short search.
 
 For each object and mode the search tries standoffs s from h/3 to h + 20 mm (h the half extent of the object's box
-towards the hand) and thumb postures s1, and for each of them a grid of 13 x 9 offsets (dx, dy) over the bounds of
+towards the hand) and thumb postures s1, and for each of them a grid of 15 x 7 offsets (dx, dy) over the bounds of
 `surehold.problems.Grasp`, with graded contacts. Of the pairs that leave 30 to 70 % of these poses free of collision it
 takes the one with the highest mean quality; without such a pair, the one nearest to that range.
 `python -m surehold.problems.grasp_defaults` repeats the search for the shipped objects and prints the table below.
@@ -46,11 +46,11 @@ def search_default(simulator: Simulator, mode: str) -> GraspDefault:
     """Search standoff and s1 of a mode as the module says."""
     along, across, depth = np.abs(facet_axes(mode).T) @ simulator.object.box_half_extents
     best, best_score = GraspDefault(depth, 0.0), (-np.inf, -np.inf)
-    for standoff in np.round(np.linspace(depth / 3.0, depth + 0.020, 9), 4):
+    for standoff in np.round(np.linspace(depth / 3.0, depth + 0.020, 7), 4):
         for s1 in _POSTURES:
             qualities, free = [], 0
-            for dx in np.linspace(-along - 0.025, along + 0.025, 13):
-                for dy in np.linspace(-across, across, 9):
+            for dx in np.linspace(-along - 0.025, along + 0.025, 15):
+                for dy in np.linspace(-across, across, 7):
                     pose = default_pose(simulator.hand, simulator.object, mode, float(standoff), (dx, dy, 0, 0, 0, 0))
                     outcome = simulator.grasp(pose, s1)
                     free += outcome.status != "initial collision"
