@@ -13,8 +13,10 @@ if TYPE_CHECKING:
     from surehold.optimization.gaussian_process import GaussianProcess
     from surehold.optimization.input_noise import InputNoise
     from surehold.optimization.maximization import Result, Trial, maximize
-    from surehold.optimization.optimizer import Optimizer, Recommendation
+    from surehold.optimization.optimizer import Optimizer
     from surehold.optimization.quadratures import sigma_points
+    from surehold.optimization.recommendation import Recommendation
+    from surehold.optimization.risk import Risk
 
 __version__ = "0.1.0"
 
@@ -26,6 +28,7 @@ __all__ = [
     "Optimizer",
     "Recommendation",
     "Result",
+    "Risk",
     "SureholdError",
     "Trial",
     "grasping",
@@ -40,7 +43,8 @@ _HOMES = {
     "InputError": "errors",
     "InputNoise": "optimization.input_noise",
     "Optimizer": "optimization.optimizer",
-    "Recommendation": "optimization.optimizer",
+    "Recommendation": "optimization.recommendation",
+    "Risk": "optimization.risk",
     "Result": "optimization.maximization",
     "SureholdError": "errors",
     "Trial": "optimization.maximization",

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
-from surehold.optimization.optimizer import Optimizer, Recommendation
+from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.recommendation import Recommendation
 
 __all__ = ["Result", "Trial", "maximize"]
 

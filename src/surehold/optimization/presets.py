@@ -42,7 +42,7 @@ THESIS: Final = {
     "thesis-rkhs": Thesis(3.93, 1e-6, 0.0025, 8),
     "thesis-gf": Thesis(0.40, 1e-6, 0.05, 15),
     "thesis-gm": Thesis(0.0642, 1e-6, 0.0156, 15),
-    "thesis-gm-noise": Thesis(0.642, 1e-6, 0.0156, 15),
+    "thesis-gm-noise": Thesis(0.642, 1e-6, 0.0, 15),
     "thesis-grasp": Thesis(0.35, 1e-4, 0.0, 20),
 }
 

@@ -1,0 +1,152 @@
+"""What counts as good, and the next trial that follows from it: criterion, input noise and risk together.
+
+Legend
+    U         points of the unit cube, (q, d)
+    accurate  perturbations by which outcomes under the input noise are computed
+    coarse    sigma points: cheap, good enough to choose where to look closer
+    outcome   UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over perturbations i and particles j     thesis (3.21)
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.optimization import maximizer
+from surehold.optimization.acquisition import Acquisition, CriterionName, where_to_look
+from surehold.optimization.quadratures import exact
+from surehold.optimization.risk import Risk, RiskImprovement, WorstCaseBound
+from surehold.optimization.robustness import Perturbations
+from surehold.optimization.surrogate import Posterior, mixture
+
+__all__ = ["Goal"]
+
+_ANCHORS: Final = 3
+_SHORTLIST: Final = 16
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What an optimizer is after."""
+
+    criterion: CriterionName
+    accurate: Perturbations
+    coarse: Perturbations
+    risk: Risk
+    margin: float
+    """improvement that does not count"""
+    kappa: float
+    """standard deviations of the confidence bounds"""
+    noisy: bool
+    """whether observations carry noise, so that the highest one is no incumbent"""
+    thesis: bool
+    """whether candidates are sought and improvement is measured as in the thesis"""
+
+    def rank(
+        self, posterior: Posterior, U: NDArray[np.float64], observed: NDArray[np.float64] | None = None
+    ) -> NDArray[np.intp]:
+        """Return the indices of U, the input with the best outcome under the input noise first.
+
+        Observed values (q,) decide where both inputs and observations are exact. Where the accurate perturbations are
+        many, all inputs are ranked by the coarse ones and the first of them again.
+        """
+        if observed is not None and not self.noisy and len(self.accurate.quadrature.weights) == 1:
+            return np.argsort(-observed, kind="stable")
+        first = self.accurate if self.thesis else self.coarse
+        order = np.argsort(-_outcomes(posterior, first, U), kind="stable")
+        top = order[:_SHORTLIST]
+        if self.risk.name == "mean":
+            values = _outcomes(posterior, self.accurate, U[top])
+        else:
+            values = self._risk(posterior, 0.0).expectation(U[top])
+        order[:_SHORTLIST] = top[np.argsort(-values, kind="stable")]
+        return order
+
+    def best(self, posterior: Posterior, tried: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return the point of the cube (d,) with the best modelled outcome under the input noise."""
+        anchors = tried[self.rank(posterior, tried)[:_ANCHORS]]
+        if self.risk.name == "mean":
+            mean = CriterionName("ucb", "robust")
+            accurate, coarse = (
+                Acquisition(posterior, mean, perturbations, 0.0, kappa=0.0)
+                for perturbations in (self.accurate, self.coarse)
+            )
+            found = maximizer.multistart(accurate, coarse, anchors.shape[1], anchors, rng)
+        else:
+            risk = self._risk(posterior, -np.inf)
+            found = maximizer.multistart(risk, risk, anchors.shape[1], anchors, rng)
+        candidates = np.concatenate([anchors[:1], found[:_ANCHORS]])
+        return candidates[self.rank(posterior, candidates)[0]]
+
+    def candidates(
+        self,
+        posterior: Posterior,
+        tried: NDArray[np.float64],
+        observed: NDArray[np.float64],
+        pending: NDArray[np.float64],
+        rng: np.random.Generator,
+    ) -> NDArray[np.float64]:
+        """Return points of the cube (c, d) for the next trial, best first.
+
+        Parameters
+        ----------
+        posterior
+            The surrogate conditioned on the trials that are told.
+        tried, observed
+            Inputs (n, d) that gave a value, and the values (n,).
+        pending : (p, d)
+            Trials under way: the model takes its own mean for granted there.
+        """
+        best, anchors = self._incumbent(posterior, tried, observed)
+        if len(pending):
+            posterior = posterior.with_pending(pending)
+        d = tried.shape[1]
+        if self.risk.name == "worst":
+            bound = WorstCaseBound(posterior, self.accurate, self.kappa)
+            found = maximizer.multistart(bound, bound, d, anchors, rng)
+            return np.concatenate([bound.weakest(found[0]), found])
+        if self.risk.name != "mean":
+            improvement = RiskImprovement(posterior, self.accurate, self.risk, float(best), rng)
+            found = maximizer.multistart(improvement, improvement, d, anchors, rng)
+            return np.concatenate([self._looks(posterior, found[0]), found])
+        if self.criterion.scale == "exact":
+            accurate = coarse = self._acquisition(posterior, Perturbations(exact(d)), best)
+        else:
+            accurate = self._acquisition(posterior, self.accurate, best)
+            coarse = self._acquisition(posterior, self.coarse, best)
+        if self.thesis:
+            return maximizer.direct(accurate, d, anchors[0], rng)
+        found = maximizer.multistart(accurate, coarse, d, anchors, rng)
+        if self.criterion.scale == "robust":
+            found = np.concatenate([self._looks(posterior, found[0]), found])
+        return found
+
+    def _incumbent(
+        self, posterior: Posterior, tried: NDArray[np.float64], observed: NDArray[np.float64]
+    ) -> tuple[Any, NDArray[np.float64]]:
+        """Return the value to improve upon, on the criterion's scale, and the best tried inputs (a, d)."""
+        if self.criterion.scale == "exact":
+            values = mixture(posterior.moments(tried))[0] if self.noisy else observed
+            return float(values.max()), tried[np.argsort(-values, kind="stable")[:_ANCHORS]]
+        anchors = tried[self.rank(posterior, tried)[:_ANCHORS]]
+        if self.thesis:  # the original improves upon the best observed value inside UEI too
+            return float(observed.max()), anchors
+        if self.risk.name != "mean":
+            return float(self._risk(posterior, 0.0).expectation(anchors[:1])[0]), anchors
+        best = self.accurate.outcome(posterior, anchors[:1]).mean  # (m, 1)
+        return best if self.criterion.scale == "robust" else float(best.mean()), anchors
+
+    def _acquisition(self, posterior: Posterior, perturbations: Perturbations, best: Any) -> Acquisition:
+        return Acquisition(posterior, self.criterion, perturbations, best, margin=self.margin, kappa=self.kappa)
+
+    def _looks(self, posterior: Posterior, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        return where_to_look(posterior, u, self.accurate, self.coarse.quadrature.offsets)
+
+    def _risk(self, posterior: Posterior, best: float) -> RiskImprovement:
+        # The same draws at every call: ranking must not depend on how often it was asked for.
+        return RiskImprovement(posterior, self.accurate, self.risk, best, np.random.default_rng(0))
+
+
+def _outcomes(posterior: Posterior, perturbations: Perturbations, U: NDArray[np.float64]) -> NDArray[np.float64]:
+    return perturbations.outcome(posterior, U).mean.mean(axis=0)

@@ -1,0 +1,127 @@
+"""The answer: an input, and what to expect of it when it is perturbed.
+
+The outcome of one execution is a mixture of normals: one for each particle of the surrogate and each perturbed point,
+with the posterior mean and standard deviation there.
+"""
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.optimization.robustness import Perturbations
+from surehold.optimization.surrogate import Posterior
+
+__all__ = ["Outcome", "Recommendation", "outcome_of"]
+
+_LEVEL: Final = 0.05
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Distribution of the outcome of one execution: an equally weighted mixture of normals."""
+
+    means: NDArray[np.float64]
+    """(c,)"""
+    stds: NDArray[np.float64]
+    """(c,)"""
+
+    @property
+    def mean(self) -> float:
+        """Expected outcome."""
+        return float(self.means.mean())
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the outcome, by the law of total variance."""
+        return float(np.sqrt(np.mean(self.stds**2) + self.means.var()))
+
+    def probability_below(self, value: float) -> float:
+        """Return the probability that the outcome is below a value."""
+        from scipy.special import ndtr
+
+        scale = np.maximum(self.stds, 1e-12 * max(float(np.ptp(self.means)), 1e-300))
+        return float(ndtr((value - self.means) / scale).mean())
+
+    def quantile(self, level: float) -> float:
+        """Return the value that the outcome is below with probability `level`, by bisection."""
+        low = float((self.means - 10.0 * self.stds).min())
+        high = float((self.means + 10.0 * self.stds).max())
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if self.probability_below(middle) < level:
+                low = middle
+            else:
+                high = middle
+        return 0.5 * (low + high)
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """The input to use, and what to expect of it when it is perturbed."""
+
+    x: NDArray[np.float64]
+    """(d,), in the box's units"""
+    mean: float
+    """expected outcome under the input noise"""
+    std: float
+    """standard deviation of one outcome: input noise and what the model does not know together"""
+    quantile: float
+    """value that 95 % of outcomes exceed"""
+    observed: float
+    """value that was told at x; NaN where x was never tried"""
+    n: int
+    """trials with a value that the recommendation rests on"""
+    outcome_std: float
+    """standard deviation, over the input noise, of the model's mean: the risk left to take; unscented variance (4.1)"""
+    refused: str
+    """why the highest observed trial was not recommended; empty where it was"""
+    outcome: Outcome = field(repr=False)
+    """distribution of one outcome"""
+
+    def probability_below(self, value: float) -> float:
+        """Return the probability that the next execution gives less than `value`."""
+        return self.outcome.probability_below(value)
+
+
+def outcome_of(posterior: Posterior, reached: Perturbations, u: NDArray[np.float64]) -> Outcome:
+    """Return what to expect of one execution at u (d,) whose perturbations have equal weights."""
+    moments, _ = reached.spread(posterior, u[None, :])
+    return Outcome(moments.mean.ravel(), np.sqrt(moments.variance).ravel())
+
+
+def recommendation(
+    posterior: Posterior,
+    reached: Perturbations,
+    sigma_points: Perturbations,
+    u: NDArray[np.float64],
+    x: NDArray[np.float64],
+    observed: float,
+    highest: tuple[NDArray[np.float64], float],
+    n: int,
+) -> Recommendation:
+    """Describe u (d,) of the unit cube, x in the box's units; `highest` is the best observed trial and its value."""
+    outcome = outcome_of(posterior, reached, u)
+    moments, _ = sigma_points.spread(posterior, u[None, :])
+    means, weights = moments.mean.mean(axis=0), sigma_points.quadrature.weights
+    variance = weights @ (means - weights @ means) ** 2
+    refused = ""
+    if np.any(np.abs(highest[0] - u) > 1e-6):
+        other = outcome_of(posterior, reached, highest[0])
+        refused = (
+            f"The highest observed trial gave {highest[1]:.4g}, but {other.mean:.4g} is expected of it under the noise, "
+            f"and less than {other.quantile(_LEVEL):.4g} once in twenty executions; of the recommended one "
+            f"{outcome.mean:.4g} is expected, and less than {outcome.quantile(_LEVEL):.4g} once in twenty."
+        )
+    return Recommendation(
+        x,
+        outcome.mean,
+        outcome.std,
+        outcome.quantile(_LEVEL),
+        observed,
+        n,
+        float(np.sqrt(max(variance, 0.0))),
+        refused,
+        outcome,
+    )
