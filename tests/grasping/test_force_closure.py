@@ -21,13 +21,13 @@ def random_contacts(rng, c):
 def test_linear_program_and_hull_agree_on_closure():
     rng = np.random.default_rng(0)
     closed = 0
-    for k in range(2000):
+    for k in range(1000):
         c = int(rng.integers(2, 8))
         w = contact_wrenches(*random_contacts(rng, c), friction=rng.uniform(0.0, 0.9), edges=int(rng.integers(3, 7)))
         verdict = force_closure(w)
         assert verdict == (ball_radius(w) > 0.0), f"set {k}"
         closed += verdict
-    assert 300 < closed < 1700
+    assert 150 < closed < 850
 
 
 def test_what_can_never_be_closed():

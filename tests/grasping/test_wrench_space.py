@@ -5,14 +5,10 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from surehold.errors import InputError
-from surehold.grasping.wrench_space import (
-    ball_radius,
-    contact_wrenches,
-    hull_volume,
-    inscribed_ball,
-    tangents,
-    wrench_quality,
-)
+from surehold.grasping import inscribed_ball as module
+from surehold.grasping.contact_wrenches import CheckedContacts, contact_wrenches, round_contacts, tangents
+from surehold.grasping.inscribed_ball import ball_radius, hull_volume, inscribed_ball
+from surehold.grasping.wrench_space import wrench_quality
 
 
 def random_contacts(rng, c):
@@ -68,7 +64,7 @@ def test_epsilon_equals_the_full_hull_on_random_contacts():
         closed += full > 0
         assert q.epsilon == pytest.approx(max(full, 0.0), abs=1e-8), f"set {k}: {c} contacts"
         assert ball_radius(q.wrenches) == q.epsilon
-        assert not q.fallback
+        assert q.fallbacks == 0
     assert closed > 100
 
 
@@ -175,3 +171,154 @@ def test_epsilon_is_continuous_as_a_weight_vanishes_and_bitwise_repeatable():
             assert values[-1] == wrench_quality(p, n, weights=weights).epsilon
         for small, value in zip((1e-3, 1e-6, 1e-9, 1e-12), values, strict=False):
             assert abs(value - values[-1]) <= 3 * small + 1e-12
+
+
+def test_rigid_motion_and_scale_change_nothing():
+    rng = np.random.default_rng(6)
+    for _ in range(10):
+        points, normals = random_contacts(rng, 6)
+        rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        rotation *= np.sign(np.linalg.det(rotation))
+        shift = rng.normal(size=3)
+        along = tangents(normals)
+        here = wrench_quality(points, normals, tangents=along)
+        there = wrench_quality(
+            3.0 * (points @ rotation.T + shift),
+            normals @ rotation.T,
+            torque_length=3.0,
+            origin=3.0 * shift,
+            tangents=along @ rotation.T,
+        )
+        assert there.signed_epsilon == pytest.approx(here.signed_epsilon, abs=1e-9)
+        rounded = [
+            wrench_quality(p, n, cones="round").signed_epsilon
+            for p, n in ((points, normals), (points @ rotation.T, normals @ rotation.T))
+        ]
+        assert rounded[0] == pytest.approx(rounded[1], abs=1e-8)  # no tangents to carry along
+
+
+def test_epsilon_does_not_depend_on_order_or_duplicates():
+    rng = np.random.default_rng(7)
+    points, normals = random_contacts(rng, 7)
+    epsilon = wrench_quality(points, normals).epsilon
+    assert epsilon > 0.0
+    order = rng.permutation(7)
+    assert wrench_quality(points[order], normals[order]).epsilon == pytest.approx(epsilon, abs=1e-12)
+    twice = np.concatenate((points, points[:4])), np.concatenate((normals, normals[:4]))
+    assert wrench_quality(*twice).epsilon == pytest.approx(epsilon, abs=1e-12)
+
+
+def test_tetrahedral_sphere_grasp():
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+    q = wrench_quality(corners, -corners, friction=0.0)
+    assert (q.epsilon, q.signed_epsilon) == (0.0, 0.0)  # no torque at all
+    forces = ConvexHull(q.wrenches[::8, :3])  # the closed form of the 3-D inradius, 1/3
+    assert -forces.equations[:, -1].max() == pytest.approx(1 / 3, abs=1e-12)
+    # friction on the same contacts closes the grasp
+    assert wrench_quality(corners, -corners, friction=0.3).epsilon > 0.05
+
+
+def test_weakest_direction_attains_epsilon():
+    rng = np.random.default_rng(8)
+    for _ in range(20):
+        q = wrench_quality(*random_contacts(rng, 6))
+        assert (q.wrenches @ q.weakest).max() == pytest.approx(q.signed_epsilon, abs=1e-9)
+        assert np.linalg.norm(q.weakest) == pytest.approx(1.0)
+        assert q.lower <= q.epsilon <= q.upper
+        assert q.upper - q.lower <= 1e-10
+
+
+def test_round_cones_lie_between_inscribed_and_circumscribed_polyhedra():
+    rng = np.random.default_rng(9)
+    closed = 0
+    for k in range(30):
+        points, normals = random_contacts(rng, int(rng.integers(3, 9)))
+        torsion = 0.1 if k % 3 == 0 else 0.0
+        given = {"friction": 0.5, "torsion": torsion, "convention": "unit_magnitude" if k % 2 else "normal_unit"}
+        q = wrench_quality(points, normals, **given, cones="round")
+        inner = wrench_quality(points, normals, **given, edges=24)
+        assert q.lower <= q.epsilon <= q.upper
+        assert q.upper - q.lower <= 5e-9
+        assert inner.epsilon <= q.upper + 1e-10
+        closed += q.force_closure
+        if torsion == 0.0 and k % 2 == 0:
+            outer = wrench_quality(points, normals, 0.5 / np.cos(np.pi / 24), 24)
+            assert q.lower <= outer.epsilon + 1e-10
+            assert q.signed_epsilon <= outer.signed_epsilon + 1e-8
+            assert inner.signed_epsilon <= q.signed_epsilon + 1e-8
+    assert closed > 15
+
+
+def test_round_support_is_the_supremum_over_the_cone():
+    rng = np.random.default_rng(10)
+    points, normals = random_contacts(rng, 3)
+    contacts = CheckedContacts.checked(points, normals, 0.6, torsion=0.2, torque_length=0.5)
+    centers, axes = round_contacts(contacts)
+    u = rng.normal(size=6)
+    z = rng.normal(size=(200_000, 3))
+    z /= np.linalg.norm(z, axis=1)[:, None]
+    for i in range(3):
+        force = normals[i] + 0.6 * (
+            z[:, :1] * contacts.tangents[i] + z[:, 1:2] * np.cross(normals[i], contacts.tangents[i])
+        )
+        moment = (np.cross(points[i], force) + 0.2 * z[:, 2:] * normals[i]) / 0.5
+        sampled = (np.hstack((force, moment)) @ u).max()
+        exact = centers[i] @ u + np.linalg.norm(u @ axes[i])
+        assert sampled <= exact + 1e-12
+        assert sampled == pytest.approx(exact, rel=1e-4)
+
+
+def test_two_soft_fingers_close_and_torsion_limits_them():
+    points, normals = np.array([[1.0, 0, 0], [-1, 0, 0]]), np.array([[-1.0, 0, 0], [1, 0, 0]])
+    for cones in ("polyhedral", "round"):
+        q = wrench_quality(points, normals, torsion=0.05, cones=cones)
+        # the moment about the line of contacts is the weakest wrench and takes all of the normal force
+        assert q.epsilon == pytest.approx(0.05, abs=2e-3)
+        assert q.epsilon <= 0.05 + 1e-9
+        assert wrench_quality(points, normals, cones=cones).epsilon == 0.0
+
+
+def test_round_epsilon_is_continuous_where_tangents_jump():
+    rng = np.random.default_rng(11)
+    pole = np.array([-0.36, -0.48, -0.8])
+    points, normals = random_contacts(rng, 5)
+    values = []
+    for step in (-1e-6, 1e-6):
+        normals[0] = np.add(pole, (step, 0.0, 0.0))
+        normals[0] /= np.linalg.norm(normals[0])
+        values.append(wrench_quality(-normals * 0.9 + 0.1 * points, normals, cones="round").signed_epsilon)
+    assert abs(values[0] - values[1]) < 1e-5
+
+
+def test_failed_expansions_fall_back_and_are_counted(monkeypatch):
+    rng = np.random.default_rng(12)
+    w = contact_wrenches(*random_contacts(rng, 6))
+    planned = inscribed_ball(w)
+    assert planned.radius > 0.0
+    original, calls = module.expand_nearest, []
+
+    def fail(*arguments):
+        calls.append(arguments)
+        result = original(*arguments)
+        return (module.FAILED, *result[1:]) if len(calls) <= failures else result
+
+    monkeypatch.setattr(module, "expand_nearest", fail)
+    for failures in (1, 2):
+        calls.clear()
+        ball = inscribed_ball(w)
+        assert ball.fallbacks == failures
+        assert ball.radius == pytest.approx(planned.radius, abs=1e-8)
+        calls.clear()
+        assert ball_radius(w) == ball.radius
+
+
+def test_hundreds_of_near_duplicates_are_measured():
+    rng = np.random.default_rng(13)
+    for k in range(40):
+        points, normals = random_contacts(rng, 5)
+        points, normals = np.repeat(points, 8, axis=0), np.repeat(normals, 8, axis=0)
+        points = points + 10.0 ** rng.uniform(-13, -5) * rng.normal(size=points.shape)
+        q = wrench_quality(points, normals)
+        alone = wrench_quality(points[::8], normals[::8])
+        assert q.epsilon == pytest.approx(alone.epsilon, abs=1e-3)
+        assert q.epsilon >= alone.epsilon - 1e-8, f"set {k}: more contacts, smaller ball"

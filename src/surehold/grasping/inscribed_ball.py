@@ -6,10 +6,10 @@ w        wrenches whose convex hull H is measured, (m, 6); round contacts may be
 h(u)     support function of H, for a unit vector u (6,)
 epsilon  radius of the largest ball about the origin in H: min of h(u) over u, 0 if that is negative
 
-Distances below TOLERANCE times the largest wrench are exactly 0. Two ways to epsilon: the compiled expansion of the
-nearest facet, and, should rounding ever spoil that, the full hull of joggled wrenches by Qhull. Numerical failure is
-never
-scored as 0.
+Distances below 1e-11 of the largest wrench are exactly 0. epsilon comes from the compiled expansion of the nearest
+facet;
+should rounding spoil it (wrenches apart by about that tolerance can), from a second one with a coarser tolerance, and
+should that fail too, from the full hull of joggled wrenches (Qhull). Numerical failure is never scored as 0.
 """
 
 from typing import NamedTuple
@@ -18,14 +18,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.grasping.contact_wrenches import RoundContacts, finite_array
-from surehold.grasping.nearest_facet import DONE, FAILED, FLAT, SPENT, TOLERANCE, expand_nearest
+from surehold.grasping.nearest_facet import DONE, FAILED, FLAT, OUTSIDE, SPENT, expand_nearest
 
 __all__ = ["InscribedBall", "ball_radius", "hull_volume", "inscribed_ball", "nearest_point"]
 
-FACET_BUDGETS = (4096, 65_536, 1_048_576)  # memory for so many facets is tried in turn; grasps need some thousands
+TOLERANCES = (1e-11, 1e-9)
+"""Tried in turn: distances below this fraction of the largest wrench count as zero."""
+FACET_BUDGETS = (4096, 65_536, 1_048_576)
+"""Memory for so many facets is tried in turn; grasps need hundreds to thousands. Round cones stop at the second."""
 MAX_WRENCHES = 65_535  # the compiled expansion packs four indices of wrenches into 64 bits
 ROUND_GAP = 1e-9
-"""Difference of the bounds at which round cones count as measured, as a fraction of the largest wrench."""
+"""Difference of the bounds at which round cones count as measured, as a fraction of the largest wrench.
+
+Perfectly symmetric contacts around an axis, whose weakest directions form a continuum, end at about 1e-3.
+"""
 
 _NO_ROUND = RoundContacts(np.zeros((0, 6)), np.zeros((0, 6, 3)))
 
@@ -45,8 +51,8 @@ class InscribedBall(NamedTuple):
     """Wrenches added after the first seven."""
     facets: int
     """Facets made on the way."""
-    fallback: bool
-    """Whether rounding spoiled the expansion and the full hull by Qhull was used."""
+    fallbacks: int
+    """0: as planned; 1: rounding spoiled the expansion, a coarser tolerance was used; 2: the full hull by Qhull was."""
 
     @property
     def radius(self) -> float:
@@ -59,12 +65,10 @@ def ball_radius(wrenches: NDArray[np.float64], round_contacts: RoundContacts | N
 
     With round contacts, their cone edges (any number of edges, 4 will do) must be among the wrenches.
     """
-    status, lower, upper, _, _, _ = _expand(wrenches, round_contacts)
+    status, lower, upper, *_ = _expand(wrenches, round_contacts)
     if status == FAILED:
         return _ball_from_hull(wrenches)[0]
-    if status == DONE and lower > TOLERANCE * _largest(wrenches):
-        return upper if round_contacts is None else lower
-    return 0.0
+    return 0.0 if status != DONE else upper if round_contacts is None else lower
 
 
 def inscribed_ball(wrenches: ArrayLike, round_contacts: RoundContacts | None = None) -> InscribedBall:
@@ -73,20 +77,19 @@ def inscribed_ball(wrenches: ArrayLike, round_contacts: RoundContacts | None = N
     Round contacts as in `ball_radius`. Raises InputError if the wrenches are not finite or not of shape (m, 6).
     """
     w = np.ascontiguousarray(finite_array("wrenches", wrenches, (None, 6)))
-    status, lower, upper, normal, expansions, facets = _expand(w, round_contacts)
-    fallback = status == FAILED
-    if fallback:
+    status, lower, upper, normal, expansions, facets, fallbacks = _expand(w, round_contacts)
+    if status == FAILED:
         lower, normal = _ball_from_hull(w)
         upper = lower if round_contacts is None else max(lower, _round_support(normal, round_contacts))
-    if status in (DONE, FAILED) and lower > TOLERANCE * _largest(w):
+        status = DONE if lower > 0.0 else OUTSIDE
+    if status == DONE:
         signed = upper if round_contacts is None else lower
-        return InscribedBall(signed, lower, upper, normal, expansions, facets, fallback)
+        return InscribedBall(signed, lower, upper, normal, expansions, facets, fallbacks)
     nearest = nearest_point(w, round_contacts) if len(w) else np.zeros(6)
     distance = float(np.sqrt(nearest @ nearest))
     if distance > 0.0:
-        normal = -nearest / distance
-    upper = max(upper, 0.0) if status == DONE else 0.0
-    return InscribedBall(-distance if distance else 0.0, 0.0, upper, normal, expansions, facets, fallback)
+        upper, normal = 0.0, -nearest / distance
+    return InscribedBall(-distance if distance else 0.0, 0.0, max(upper, 0.0), normal, expansions, facets, fallbacks)
 
 
 def nearest_point(wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None) -> NDArray[np.float64]:
@@ -98,7 +101,7 @@ def nearest_point(wrenches: NDArray[np.float64], round_contacts: RoundContacts |
     """
     centers, axes = round_contacts or _NO_ROUND
     scale = _largest(wrenches)
-    stop = scale * (ROUND_GAP if len(centers) else TOLERANCE)
+    stop = scale * (ROUND_GAP if len(centers) else TOLERANCES[0])
     corral = wrenches[[np.argmin(np.sum(wrenches**2, axis=1))]]
     weights = np.ones(1)
     x = corral[0]
@@ -143,26 +146,38 @@ def hull_volume(wrenches: ArrayLike) -> float:
     if len(w) <= w.shape[1]:
         return 0.0
     spread = np.linalg.svd(w - w.mean(axis=0), compute_uv=False)
-    if spread[-1] <= TOLERANCE * spread[0]:
+    if spread[-1] <= TOLERANCES[0] * spread[0]:
         return 0.0
     return float(ConvexHull(w, qhull_options="QJ Pp").volume)
 
 
 def _expand(
     w: NDArray[np.float64], round_contacts: RoundContacts | None
-) -> tuple[int, float, float, NDArray[np.float64], int, int]:
-    """Run `expand_nearest` with the memory it needs; FAILED means: use the full hull."""
+) -> tuple[int, float, float, NDArray[np.float64], int, int, int]:
+    """Run `expand_nearest` with the memory and tolerance it needs; its result, and the fallbacks.
+
+    The status is DONE if there is a ball, FLAT or OUTSIDE if not, FAILED if the full hull must decide.
+    """
+    flat = np.zeros(6)
     if len(w) < 7:
-        return FLAT, 0.0, 0.0, np.zeros(6), 0, 0
+        return FLAT, 0.0, 0.0, flat, 0, 0, 0
     centers, axes = round_contacts or _NO_ROUND
-    gap = ROUND_GAP * _largest(w) if len(centers) else 0.0
-    for budget in FACET_BUDGETS if len(w) <= MAX_WRENCHES else ():
-        status, lower, upper, normal, expansions, facets = expand_nearest(w, centers, axes, gap, budget)
-        if status == SPENT and len(centers) and budget == FACET_BUDGETS[-1]:
+    gap = ROUND_GAP if len(centers) else 0.0
+    attempts = TOLERANCES if len(w) <= MAX_WRENCHES else ()
+    for fallbacks, tolerance in enumerate(attempts):
+        result = expand_nearest(w, centers, axes, tolerance, gap, FACET_BUDGETS[0])
+        for budget in FACET_BUDGETS[1 : 2 if len(centers) else None]:
+            if result[0] != SPENT:
+                break
+            result = expand_nearest(w, centers, axes, tolerance, gap, budget)
+        status, lower, upper, normal, expansions, facets = result
+        if status == SPENT and len(centers):
             status = DONE  # the bounds hold, they are only wider apart
-        if status != SPENT:
-            return status, lower, upper, normal, expansions, facets
-    return FAILED, 0.0, 0.0, np.zeros(6), 0, 0
+        if status == DONE and lower <= tolerance * _largest(w):
+            status = OUTSIDE
+        if status in (DONE, FLAT, OUTSIDE):
+            return status, lower, upper, normal, expansions, facets, fallbacks
+    return FAILED, 0.0, 0.0, flat, 0, 0, len(TOLERANCES)
 
 
 def _ball_from_hull(w: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

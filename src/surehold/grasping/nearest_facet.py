@@ -21,17 +21,14 @@ description method (Motzkin et al. 1953). There is no cancellation and no orient
 the new facet inherits the plane of B. That makes friction cones, contact patches and symmetric grasps harmless, whose
 wrenches are coplanar by the dozen and force Qhull to joggle them.
 
-s sees a facet if it lies above it by more than TOLERANCE times the largest wrench. Not to see coplanar facets
-is the placing triangulation, which is consistent however degenerate the wrenches are.
+s sees a facet if it lies above it by more than a tolerance. Not to see coplanar facets is the placing triangulation,
+which is consistent however degenerate the wrenches are.
 """
 
 import numpy as np
 from numba import njit
 
-__all__ = ["DONE", "FAILED", "FLAT", "OUTSIDE", "SPENT", "TOLERANCE", "expand_nearest"]
-
-TOLERANCE = 1e-11
-"""Distances below this fraction of the largest wrench count as zero."""
+__all__ = ["DONE", "FAILED", "FLAT", "OUTSIDE", "SPENT", "expand_nearest"]
 
 DONE = 0
 """The nearest facet is a facet of the hull, or the gap asked for is reached."""
@@ -46,11 +43,12 @@ FAILED = 4
 
 
 @njit(cache=True)
-def expand_nearest(wrenches, centers, axes, gap, max_facets):
+def expand_nearest(wrenches, centers, axes, tolerance, gap, max_facets):
     """Expand the facet nearest to the origin until it is a facet of the hull.
 
     Arguments: wrenches (m, 6), 7 <= m < 65536; round contacts centers (c, 6) and axes (c, 6, 3), beside the wrenches;
-    gap, the difference of the bounds at which to stop early (0 for none); max_facets, to stop at.
+    tolerance, below which distances count as zero, and gap, the difference of the bounds at which to stop early (0 for
+    none), both as fractions of the largest wrench; max_facets, to stop at.
     Return (status, lower, upper, u, expansions, facets) with h(u) = upper, u (6,). For DONE and SPENT lower <= epsilon
     <= upper (where lower is positive); for OUTSIDE upper < 0; for FLAT and FAILED the bounds mean nothing.
     """
@@ -63,7 +61,8 @@ def expand_nearest(wrenches, centers, axes, gap, max_facets):
             points[i, j] = wrenches[i, j]
             square += wrenches[i, j] ** 2
         scale = max(scale, square)
-    tolerance = TOLERANCE * np.sqrt(scale)
+    tolerance *= np.sqrt(scale)
+    gap *= np.sqrt(scale)
 
     vertices = np.empty((max_facets, 6), np.int64)  # ascending
     neighbors = np.empty((max_facets, 6), np.int64)  # [f, k] lies across the ridge without vertices[f, k]

@@ -64,11 +64,11 @@ class WrenchQuality:
     lower: float
     """Certified lower bound of epsilon."""
     upper: float
-    """Certified upper bound of epsilon: equal to `lower` to rounding, for round cones to 1e-9 of the largest wrench."""
+    """Certified upper bound of epsilon; equal to `lower` to rounding, for round cones usually to 1e-9."""
     weakest: NDArray[np.float64] = field(repr=False, compare=False)
     """Unit wrench direction in which the grasp resists least, (6,)."""
-    fallback: bool
-    """Whether rounding spoiled the fast expansion and the full hull by Qhull was used."""
+    fallbacks: int
+    """0: as planned; 1: rounding spoiled the expansion, a coarser tolerance was used; 2: the full hull by Qhull was."""
     wrenches: NDArray[np.float64] = field(repr=False, compare=False)
     """Wrenches of the cone edges, (m, 6)."""
 
@@ -136,5 +136,5 @@ def wrench_quality(
     wrenches = cone_edges(contacts, edges)
     ball = inscribed_ball(wrenches, round_contacts(contacts) if cones == "round" else None)
     return WrenchQuality(
-        ball.radius, ball.signed, ball.radius > 0.0, ball.lower, ball.upper, ball.normal, ball.fallback, wrenches
+        ball.radius, ball.signed, ball.radius > 0.0, ball.lower, ball.upper, ball.normal, ball.fallbacks, wrenches
     )
