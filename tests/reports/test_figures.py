@@ -16,6 +16,7 @@ def test_every_figure_is_drawn(gm_report, rkhs_report):
 def test_files_are_valid_and_repeatable(rkhs_report):
     figure = figures.trace(rkhs_report)
     text = figures.svg_text(figure, "trace")
+    ElementTree.fromstring(figures.on_white(text))
     root = ElementTree.fromstring(text)
     assert root.tag.endswith("svg")
     assert text == figures.svg_text(figures.trace(rkhs_report), "trace")
@@ -26,7 +27,8 @@ def test_files_are_valid_and_repeatable(rkhs_report):
 
 
 def test_inline_figures_follow_the_page(gm_report):
-    text = figures.inline_svg(figures.shake(gm_report, gm_report.highest), "shake", 'what "shaking" does')
+    drawing = figures.svg_text(figures.shake(gm_report, gm_report.highest), "shake")
+    text = figures.inline_svg(drawing, "shake", 'what "shaking" does')
     root = ElementTree.fromstring(text)
     assert "width" not in root.attrib
     assert root.attrib["aria-label"] == 'what "shaking" does'

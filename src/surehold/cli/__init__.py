@@ -25,11 +25,11 @@ def run(arguments: list[str]) -> int:
     try:
         code = typer.main.get_command(application())(args=arguments, prog_name="surehold", standalone_mode=False)
         return code if isinstance(code, int) else 0
-    except typer.Exit as end:
-        return end.exit_code
+    except typer.Exit as end:  # what typer makes of Ctrl-C, too
+        return _interrupted() if end.exit_code == 130 else end.exit_code
     except exceptions.TyperException as error:
         format_message = getattr(error, "format_message", None)
-        _say(format_message() if format_message else str(error))
+        _say(f"{format_message() if format_message else error} See surehold --help.")
         return int(getattr(error, "exit_code", 2))
     except InputError as error:
         _say(str(error))
@@ -38,8 +38,12 @@ def run(arguments: list[str]) -> int:
         _say(str(error))
         return 1
     except (KeyboardInterrupt, typer.Abort):
-        _say("interrupted before any trial gave a value; there is nothing to keep.")
-        return 130
+        return _interrupted()
+
+
+def _interrupted() -> int:
+    _say("interrupted before any trial gave a value; there is nothing to keep.")
+    return 130
 
 
 def _say(message: str) -> None:

@@ -25,12 +25,16 @@ def application() -> typer.Typer:
     app.command()(maximize)
     app.command()(doctor)
 
-    @app.callback()
-    def version(
-        show: bool = typer.Option(False, "--version", help="Show the version and exit.", is_eager=True),
-    ) -> None:
-        if show:
+    def show_version(asked: bool) -> None:
+        if asked:
             typer.echo(f"surehold {__version__}")
             raise typer.Exit()
+
+    @app.callback()
+    def options(
+        version: bool = typer.Option(
+            False, "--version", help="Show the version and exit.", is_eager=True, callback=show_version
+        ),
+    ) -> None: ...
 
     return app

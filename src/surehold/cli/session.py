@@ -67,6 +67,9 @@ def run_session(
         If Ctrl-C comes before any trial has given a value.
     """
     console = console or Console(highlight=False)
+    for name, count in (("trials", trials), ("initial", initial)):
+        if count < 1:
+            raise InputError(f"--{name} is {count}; give 1 or more.")
     if initial > trials:
         raise InputError(
             f"--initial is {initial}, but --trials is {trials}; give at least as many trials as initial ones."

@@ -19,7 +19,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["PALETTE", "figures", "inline_svg", "overview", "png_bytes", "shake", "surface", "svg_text", "trace"]
+__all__ = [
+    "PALETTE",
+    "figures",
+    "inline_svg",
+    "on_white",
+    "overview",
+    "png_bytes",
+    "shake",
+    "shake_name",
+    "surface",
+    "surface_names",
+    "svg_text",
+    "trace",
+]
 
 #: Okabe and Ito's vermilion and blue (told apart by color-blind readers), darkened for contrast on white.
 PALETTE: Final = {"ink": "#1b1f25", "muted": "#68707b", "grid": "#d8dce2", "high": "#c24e00", "answer": "#0a65b3"}
@@ -60,21 +73,31 @@ def _style(salt: str) -> Iterator[None]:
 
 
 def figures(report: RunReport) -> dict[str, "Figure"]:
-    """Return every figure of the run by file name: overview, trace, shake_*, surface_*."""
-    with _style("figures"):
-        drawn = {"overview": overview(report), "trace": trace(report)}
-        for candidate in report.candidates:
-            if candidate.values.size:
-                drawn[f"shake_{candidate.label.replace(' ', '_')}"] = shake(report, candidate)
-        for i, view in enumerate(report.surfaces):
-            end = f"_{i + 1}" if len(report.surfaces) > 1 else ""
-            if len(view.variables) == 1:
-                drawn[f"surface{end}"] = surface(report, view, robust=False)
-                continue
-            drawn[f"surface_mean{end}"] = surface(report, view, robust=False)
-            if view.robust_mean is not None:
-                drawn[f"surface_unscented{end}"] = surface(report, view, robust=True)
+    """Return every figure of the run by name: trace, shake_*, surface_*, and the overview."""
+    drawn = {"trace": trace(report)}
+    for candidate in report.candidates:
+        if candidate.values.size:
+            drawn[shake_name(candidate)] = shake(report, candidate)
+    for i, view in enumerate(report.surfaces):
+        for robust, name in surface_names(report, i).items():
+            drawn[name] = surface(report, view, robust)
+    drawn["overview"] = overview(report)
     return drawn
+
+
+def shake_name(candidate: Candidate) -> str:
+    """Return the name of a candidate's histogram among the figures."""
+    return f"shake_{candidate.label.replace(' ', '_')}"
+
+
+def surface_names(report: RunReport, index: int) -> dict[bool, str]:
+    """Return the names of the figures of a surface: of the model, and (True) of its average over the input noise."""
+    view = report.surfaces[index]
+    end = f"_{index + 1}" if len(report.surfaces) > 1 else ""
+    if len(view.variables) == 1:
+        return {False: f"surface{end}"}  # one figure shows both lines
+    names = {False: f"surface_mean{end}"}
+    return names if view.robust_mean is None else names | {True: f"surface_unscented{end}"}
 
 
 def shake(report: RunReport, candidate: Candidate) -> "Figure":
@@ -142,16 +165,22 @@ def overview(report: RunReport) -> "Figure":
     return figure
 
 
-def svg_text(figure: "Figure", salt: str = "figure") -> str:
-    """Return the figure as a stand-alone SVG document on white, the same bytes every time."""
-    with _style(salt):
+def svg_text(figure: "Figure", name: str) -> str:
+    """Return the figure as an SVG document without background, the same bytes every time."""
+    with _style(name):
         buffer = io.StringIO()
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, facecolor="white")
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
     return buffer.getvalue()
 
 
+def on_white(text: str) -> str:
+    """Return an SVG document with a white background, so that it can stand alone."""
+    start = text.index(">", text.index("<svg")) + 1
+    return f'{text[:start]}\n <rect width="100%" height="100%" fill="#ffffff"/>{text[start:]}'
+
+
 def png_bytes(figure: "Figure") -> bytes:
-    """Return the figure as PNG on white, 160 dots an inch."""
+    """Return the figure as PNG on white, 160 dots an inch, the same bytes every time."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure)
@@ -161,17 +190,13 @@ def png_bytes(figure: "Figure") -> bytes:
     return buffer.getvalue()
 
 
-def inline_svg(figure: "Figure", name: str, description: str) -> str:
-    """Return the figure as an `<svg>` element for a page: as wide as its place, transparent, colors as CSS variables.
+def inline_svg(text: str, name: str, description: str) -> str:
+    """Return an SVG document as an `<svg>` element for a page: as wide as its place, its colors CSS variables.
 
     `name` keeps its identifiers apart from those of the other figures of the page.
     """
     from markupsafe import escape
 
-    with _style(name):
-        buffer = io.StringIO()
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
-    text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", text, count=1)
@@ -245,7 +270,14 @@ def _draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> N
     )
     if high > low:
         axes.contour(
-            a, b, values.T, levels=np.linspace(low, high, 11)[1:-1], colors="white", linewidths=0.5, alpha=0.45
+            a,
+            b,
+            values.T,
+            levels=np.linspace(low, high, 9)[1:-1],
+            colors="white",
+            linewidths=0.5,
+            linestyles="solid",
+            alpha=0.4,
         )
     sliced = len(report.variables) > 2
     X = report.X[:, [i, j]] * [first.factor, second.factor]

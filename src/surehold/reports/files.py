@@ -73,9 +73,11 @@ def write_run(report: RunReport, folder: str | Path) -> Path:
     path = checked_folder(folder)
     pictures = checked_folder(path / "figures")
     write_file(path / "result.json", json.dumps(result_data(report), indent=2, allow_nan=False) + "\n")
-    write_file(path / "report.html", page.render(report))
-    for name, figure in figures.figures(report).items():
-        write_file(pictures / f"{name}.svg", figures.svg_text(figure, name))
+    drawn = figures.figures(report)
+    drawings = {name: figures.svg_text(figure, name) for name, figure in drawn.items()}
+    write_file(path / "report.html", page.render(report, drawings))
+    for name, figure in drawn.items():
+        write_file(pictures / f"{name}.svg", figures.on_white(drawings[name]))
         write_file(pictures / f"{name}.png", figures.png_bytes(figure))
     return path / "report.html"
 

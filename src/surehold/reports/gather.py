@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["answers", "candidate", "grasp_scene", "report_of", "surfaces_of"]
 
 _OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
-_LINE, _SQUARE = 301, 61  # grid points along a line, and along each side of a square
+_LINE, _SQUARE = 301, 81  # grid points along a line, and along each side of a square
 
 
 def answers(result: Result) -> dict[str, int]:
@@ -151,7 +151,7 @@ def grasp_scene(scene: "GraspScene") -> Scene:
 
 
 def surfaces_of(
-    posterior: Posterior, box: Box, noise: InputNoise | None, x: NDArray[np.float64]
+    posterior: Posterior, box: Box, noise: InputNoise | None, x: NDArray[np.floating]
 ) -> tuple[Surface, ...]:
     """Return the model over the box for d = 1 and 2; for d > 2 a slice through x over the two most important variables.
 

@@ -1,13 +1,14 @@
 """One run as one HTML file that opens without network: text, pictures and the 3-D scene are all inside."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from surehold.reports import figures
-from surehold.reports.run_report import Candidate, RunReport, Surface
+from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.scene import scene_data
 from surehold.reports.verdict import change, coordinates, number, verdict
 
@@ -16,8 +17,15 @@ __all__ = ["render", "table_rows"]
 _TEMPLATES: Final = Path(__file__).parent / "templates"
 
 
-def render(report: RunReport) -> str:
+def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
     """Return the page of a run as HTML text.
+
+    Parameters
+    ----------
+    report
+        The run.
+    drawings
+        Its figures as `figures.svg_text` by name, if they have been drawn already.
 
     Raises
     ------
@@ -37,6 +45,8 @@ def render(report: RunReport) -> str:
         lstrip_blocks=True,
     )
     told = verdict(report)
+    if drawings is None:
+        drawings = {name: figures.svg_text(figure, name) for name, figure in figures.figures(report).items()}
     scene = scene_data(report.candidates)
     if scene is not None:
         for view, candidate in zip(scene["views"], (c for c in report.candidates if c.scene is not None), strict=True):
@@ -50,14 +60,14 @@ def render(report: RunReport) -> str:
         n_failed=int(report.failed.sum()),
         noise_text=_noise_text(report),
         two=len(report.candidates) > 1,
-        cards=[_card(report, c, told.refused) for c in report.candidates],
+        cards=[_card(report, c, told.refused, drawings) for c in report.candidates],
         scene=None if scene is None else Markup(_json_for_html(scene)),
         scene_labels=[_label(report, c) for c in report.candidates if c.scene is not None],
         scene_has_box=any(c.scene is not None and c.scene.box is not None for c in report.candidates),
         three=Markup("" if scene is None else _vendored("three.bundle.min.js")),
         scene_script=Markup((_TEMPLATES / "scene.js").read_text(encoding="utf-8")),
-        maps=[_map(report, view, i) for i, view in enumerate(report.surfaces)],
-        trace=Markup(figures.inline_svg(figures.trace(report), "trace", "Best and robust value by trial")),
+        maps=[_map(report, i, drawings) for i in range(len(report.surfaces))],
+        trace=Markup(figures.inline_svg(drawings["trace"], "trace", "Best and robust value by trial")),
         rows=table_rows(report),
         settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
         trials=_trials(report),
@@ -81,7 +91,7 @@ def _label(report: RunReport, candidate: Candidate) -> dict[str, str]:
     return {"role": role, "mark": "▲" if role == "high" else "●", "text": text}
 
 
-def _card(report: RunReport, candidate: Candidate, refused: bool) -> dict[str, Any]:
+def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapping[str, str]) -> dict[str, Any]:
     from markupsafe import Markup
 
     label = _label(report, candidate)
@@ -96,7 +106,7 @@ def _card(report: RunReport, candidate: Candidate, refused: bool) -> dict[str, A
             f"Histogram of {candidate.values.size} re-queries of the {candidate.label} point: mean "
             f"{number(candidate.mean)}, worst {number(candidate.worst)}"
         )
-        svg = Markup(figures.inline_svg(figures.shake(report, candidate), name, text))
+        svg = Markup(figures.inline_svg(drawings[figures.shake_name(candidate)], name, text))
     return {
         **label,
         "title": label["text"],
@@ -108,6 +118,7 @@ def _card(report: RunReport, candidate: Candidate, refused: bool) -> dict[str, A
         "worst": number(candidate.worst),
         "std": number(candidate.std, 2),
         "n": candidate.values.size,
+        "halved": int(np.sum(candidate.values < 0.5 * candidate.quality)) if candidate.quality > 0.0 else 0,
         "change": change(candidate) if shaken else "",
         "svg": svg,
     }
@@ -140,26 +151,16 @@ def _noise_text(report: RunReport) -> str:
     return ", ".join(shown)
 
 
-def _map(report: RunReport, view: Surface, index: int) -> dict[str, Any]:
+def _map(report: RunReport, index: int, drawings: Mapping[str, str]) -> dict[str, Any]:
     from markupsafe import Markup
 
+    view = report.surfaces[index]
     names = " and ".join(report.variables[i].name for i in view.variables)
-    is_map = len(view.variables) == 2
-    kinds = [False, True] if is_map and view.robust_mean is not None else [False]
-    return {
-        "note": view.note,
-        "is_map": is_map,
-        "svgs": [
-            Markup(
-                figures.inline_svg(
-                    figures.surface(report, view, robust),
-                    f"map{index}{'u' if robust else 'm'}",
-                    f"{'Unscented mean' if robust else 'Mean'} of the model over {names}, with the trials",
-                )
-            )
-            for robust in kinds
-        ],
-    }
+    pictures = []
+    for robust, name in figures.surface_names(report, index).items():
+        text = f"{'Unscented mean' if robust else 'Mean'} of the model over {names}, with the trials"
+        pictures.append(Markup(figures.inline_svg(drawings[name], name, text)))
+    return {"note": view.note, "is_map": len(view.variables) == 2, "svgs": pictures}
 
 
 def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:

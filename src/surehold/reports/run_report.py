@@ -79,7 +79,7 @@ class Scene:
     meshes: tuple[SceneMesh, ...]
     contacts: ContactSet | None = None
     box: ObjectBox | None = None
-    view: tuple[float, float, float] = (0.9, -1.2, 0.7)  #: direction from the object to the eye
+    view: tuple[float, float, float] = (0.5, -0.8, 1.0)  #: direction from the object to the eye
 
 
 @dataclass(frozen=True)

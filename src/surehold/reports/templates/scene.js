@@ -21,6 +21,41 @@
   stage.append(renderer.domElement);
 
   const bytes = (key) => Uint8Array.from(atob(data.buffers[key]), (c) => c.charCodeAt(0)).buffer;
+  // Normals of a corner: faces around its vertex that bend by less than 35 degrees, weighted by their angle
+  // there and their area, so that round bodies look round, flat ones flat, and edges sharp, however they are cut.
+  const smooth = (vertices, faces) => {
+    const corner = (i) => [vertices[3 * i], vertices[3 * i + 1], vertices[3 * i + 2]];
+    const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    const unit = (a) => { const l = Math.hypot(...a) || 1; return [a[0] / l, a[1] / l, a[2] / l]; };
+    const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    const around = new Map(), keys = [], normals = [];
+    for (let f = 0; f < faces.length; f += 3) {
+      const p = [0, 1, 2].map((k) => corner(faces[f + k]));
+      const span = cross(minus(p[1], p[0]), minus(p[2], p[0])), area = Math.hypot(...span), normal = unit(span);
+      normals.push(normal);
+      for (let k = 0; k < 3; k++) {
+        const a = unit(minus(p[(k + 1) % 3], p[k])), b = unit(minus(p[(k + 2) % 3], p[k]));
+        const key = p[k].map((v) => Math.round(v * 1e6)).join();
+        keys.push(key);
+        if (!around.has(key)) around.set(key, []);
+        around.get(key).push([normal, area * Math.acos(Math.min(Math.max(dot(a, b), -1), 1))]);
+      }
+    }
+    const position = new Float32Array(3 * faces.length), shading = new Float32Array(3 * faces.length);
+    for (let i = 0; i < faces.length; i++) {
+      const own = normals[Math.floor(i / 3)], sum = [0, 0, 0];
+      for (const [normal, weight] of around.get(keys[i])) {
+        if (dot(own, normal) > 0.82) for (let k = 0; k < 3; k++) sum[k] += weight * normal[k];
+      }
+      position.set(corner(faces[i]), 3 * i);
+      shading.set(dot(sum, sum) > 0 ? unit(sum) : own, 3 * i);
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    geometry.setAttribute("normal", new THREE.BufferAttribute(shading, 3));
+    return geometry;
+  };
   const scene = new THREE.Scene();
   const camera = new THREE.PerspectiveCamera(36, 1, 0.001, 100);
   camera.up.set(0, 0, 1);
@@ -28,10 +63,7 @@
   scene.add(new THREE.HemisphereLight(0xffffff, 0x8c8c99, 1.7), lamp);
 
   const solids = data.meshes.map((mesh) => {
-    let geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(bytes(mesh.vertices)), 3));
-    geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(bytes(mesh.faces)), 1));
-    geometry = THREE.toCreasedNormals(geometry, 0.6);
+    const geometry = smooth(new Float32Array(bytes(mesh.vertices)), new Uint32Array(bytes(mesh.faces)));
     const material = new THREE.MeshStandardMaterial({ color: mesh.color, roughness: 0.65, metalness: 0, side: THREE.DoubleSide });
     const solid = new THREE.Mesh(geometry, material);
     solid.visible = false;
@@ -53,17 +85,21 @@
 
   const marks = data.views.map((view) => {
     const cones = new THREE.Group(), dots = new THREE.Group(), box = new THREE.Group();
-    const length = 0.17 * radius;
-    view.contacts.forEach((contact) => {
+    const many = view.contacts.length > 24, drawn = [];
+    const length = (many ? 0.13 : 0.17) * radius;
+    // Heaviest first: of many contacts side by side, one cone is drawn for all, or nothing could be seen.
+    [...view.contacts].sort((a, b) => b.w - a.w).forEach((contact) => {
       const point = new THREE.Vector3(...contact.p), normal = new THREE.Vector3(...contact.n).normalize();
-      const share = 0.35 + 0.65 * contact.w;
-      const dot = new THREE.Mesh(new THREE.SphereGeometry(0.016 * radius, 20, 14),
+      const dot = new THREE.Mesh(new THREE.SphereGeometry((many ? 0.006 + 0.006 * contact.w : 0.016) * radius, 16, 12),
         new THREE.MeshBasicMaterial({ color: "#e8384f" }));
       dot.position.copy(point);
       dots.add(dot);
+      if (many && drawn.some((other) => other.distanceTo(point) < 0.2 * radius)) return;
+      drawn.push(point);
+      const share = 0.35 + 0.65 * contact.w;
       const wide = Math.max(contact.mu, 0.02) * length * share;
       const cone = new THREE.Mesh(new THREE.ConeGeometry(wide, length * share, 40, 1, true),
-        new THREE.MeshStandardMaterial({ color: "#f2b705", transparent: true, opacity: 0.25 + 0.5 * contact.w,
+        new THREE.MeshStandardMaterial({ color: "#ffc400", emissive: "#8a6200", transparent: true, opacity: 0.4 + 0.5 * contact.w,
           side: THREE.DoubleSide, depthWrite: false, roughness: 0.6 }));
       // A cone stands on its base with its tip at +y; here its tip is the contact and it opens along the normal.
       cone.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), normal.clone().negate());
@@ -116,17 +152,20 @@
     draw();
   };
   const reset = () => {
-    const aspect = stage.clientWidth / stage.clientHeight;
-    const distance = 1.12 * radius / Math.sin(halfAngle(aspect));
-    camera.position.copy(middle).addScaledVector(new THREE.Vector3(...data.views[current].view).normalize(), distance);
+    // As near as the box around everything allows: each corner must stay inside the picture.
+    const back = new THREE.Vector3(...data.views[current].view).normalize();
+    const right = new THREE.Vector3(0, 0, 1).cross(back).normalize(), up = back.clone().cross(right);
+    const tall = Math.tan(camera.fov * Math.PI / 360), wide = tall * stage.clientWidth / stage.clientHeight;
+    let distance = 0;
+    for (const x of [span.min.x, span.max.x]) for (const y of [span.min.y, span.max.y]) for (const z of [span.min.z, span.max.z]) {
+      const p = new THREE.Vector3(x, y, z).sub(middle);
+      distance = Math.max(distance, p.dot(back) + Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(up)) / tall));
+    }
+    camera.position.copy(middle).addScaledVector(back, 1.06 * distance);
     controls.target.copy(middle);
     controls.update();
     draw();
   };
-  function halfAngle(aspect) {
-    const vertical = camera.fov * Math.PI / 360;
-    return aspect >= 1 ? vertical : Math.atan(Math.tan(vertical) * aspect);
-  }
   const resize = () => {
     const width = stage.clientWidth, height = stage.clientHeight;
     if (!width || !height) return;

@@ -1,0 +1,185 @@
+import json
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from surehold.cli import run
+
+OWN = """
+import os, signal
+calls = 0
+
+def hill(x):
+    return 1.0 - float(((x - 0.3) ** 2).sum())
+
+def needle(x):
+    if x[0] > 0.7:
+        raise RuntimeError("the gripper\\nslipped")
+    return float(x[0])
+
+def hopeless(x):
+    raise ValueError("no robot here")
+
+def stopped(x):
+    global calls
+    calls += 1
+    if calls == 9:
+        os.kill(os.getpid(), signal.SIGINT)
+    return float(-x[0])
+
+def stopped_at_once(x):
+    os.kill(os.getpid(), signal.SIGINT)
+    return 0.0
+"""
+
+
+def surehold(line):
+    return run(line.split())
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    (tmp_path / "own.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("maximize rkh", "did you mean 'rkhs'"),
+        ("maximize rkhs --method bu", "choose one of: ubo, bo"),
+        ("maximize rkhs --initial 60", "--initial is 60, but --trials is 50"),
+        ("maximize rkhs --trials 0", "--trials is 0"),
+        ("maximize rkhs --seed -1", "seed is -1"),
+        ("maximize rkhs --noise -0.1", "-0.1"),
+        ("maximize rkhs --noise nan", "nan"),
+        ("maximize rkhs --noise lots", "is not a number"),
+        ("maximize rkhs --noise none", "needs input noise"),
+        ("maximize gm --noise x1=0.1", "says nothing about x2"),
+        ("maximize gm --noise x1=0.1,y=0.1", "'y' is unknown"),
+        ("maximize gm --bounds a=0:1", "has its own bounds"),
+        ("maximize rkhs --out own.py", "cannot be written"),
+        ("maximize rkhs --preset thesi", "did you mean 'thesis'"),
+        ("maximize own.py:hill", "--bounds are missing"),
+        ("maximize own.py:hill --bounds a=1:0", "smaller"),
+        ("maximize own.py:hill --bounds a=0:inf", "finite"),
+        ("maximize own.py:hil --bounds a=0:1", "did you mean 'hill'"),
+        ("maximize gone.py:hill --bounds a=0:1", "does not exist"),
+        ("maximize rkhs --colour red", "--colour"),
+        ("maximize", "Missing argument 'problem'"),
+        ("maximise rkhs", "maximise"),
+        ("grasp mugg", "did you mean 'mug'"),
+        ("grasp mug --facet rihgt-front", "did you mean 'right"),
+        ("grasp mug --facet right-left", "right-front"),
+        ("grasp mug --variables dx,dq", "'dq' is unknown"),
+        ("grasp mug --variables dx,dx", "each once"),
+        ("grasp mug --contact hard", "choose one of"),
+        ("grasp mug --quality best", "choose one of"),
+        ("grasp mug --initial 101", "--initial is 101"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(arguments, message, capsys):
+    assert surehold(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1, captured.err
+    assert captured.err.startswith("error: ")
+    assert message in captured.err
+
+
+def test_an_own_function_from_start_to_report(here, capsys):
+    line = "maximize own.py:hill --bounds a=0:1,b=0:1 --trials 14 --initial 8 --noise 0.05 --seed 3 --out results"
+    assert surehold(line) == 0
+    out = capsys.readouterr().out
+    assert "recommended" in out
+    assert "results/report.html" in out
+    data = json.loads((here / "results" / "result.json").read_text())
+    assert len(data["trials"]["y"]) == 14
+    assert data["seed"] == 3
+    assert data["settings"]["method"] == "ubo"
+    assert len(data["candidates"][-1]["requeries"]["values"]) == 100
+    first = {p.name: p.read_bytes() for p in (here / "results").rglob("*") if p.is_file()}
+    assert surehold(line) == 0
+    again = {p.name: p.read_bytes() for p in (here / "results").rglob("*") if p.is_file()}
+    assert first == again, "the same run writes the same files"
+
+
+def test_plain_method_is_scored_under_the_noise_too(here, capsys):
+    assert surehold("maximize rkhs --method bo --trials 10 --seed 1 --preset thesis-rkhs") == 0
+    data = json.loads((here / "runs" / "rkhs-bo-seed1" / "result.json").read_text())
+    assert data["robust"] is None
+    assert len(data["candidates"][0]["requeries"]["values"]) == 100
+    capsys.readouterr()
+
+
+def test_no_noise_at_all(here, capsys):
+    assert surehold("maximize gf --method bo --noise none --trials 22") == 0
+    data = json.loads((here / "runs" / "gf-bo-seed0" / "result.json").read_text())
+    assert data["candidates"][0]["requeries"]["values"] == []
+    assert "No re-queries" in (here / "runs" / "gf-bo-seed0" / "report.html").read_text(encoding="utf-8")
+    capsys.readouterr()
+
+
+def test_trials_that_raise_are_failures_and_the_run_goes_on(here, capsys):
+    assert surehold("maximize own.py:needle --bounds a=0:1 --trials 10 --initial 6 --noise 0.02") == 0
+    assert "the gripper" in capsys.readouterr().out
+    data = json.loads((here / "runs" / "needle-ubo-seed0" / "result.json").read_text())
+    assert None in data["trials"]["y"]
+
+
+def test_all_trials_failed(capsys):
+    assert surehold("maximize own.py:hopeless --bounds a=0:1 --trials 6") == 1
+    error = capsys.readouterr().err
+    assert "all 6 trials failed" in error
+    assert "no robot here" in error
+
+
+def test_interrupt_keeps_what_was_done(here, capsys):
+    assert surehold("maximize own.py:stopped --bounds a=0:1 --trials 30 --initial 6") == 0
+    assert "Interrupted after 8 of 30 trials" in capsys.readouterr().out
+    folder = here / "runs" / "stopped-ubo-seed0"
+    data = json.loads((folder / "result.json").read_text())
+    assert data["interrupted"]
+    assert len(data["trials"]["y"]) == 8
+    assert "was interrupted after 8" in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_interrupt_before_anything(capsys):
+    assert surehold("maximize own.py:stopped_at_once --bounds a=0:1") == 130
+    assert "nothing to keep" in capsys.readouterr().err
+
+
+def test_a_short_grasp_run(here, capsys):
+    assert surehold("grasp mug --trials 12 --initial 10 --noise 0.03 --out mug") == 0
+    out = capsys.readouterr().out
+    assert "quality (epsilon)" in out
+    assert "palm at" in out
+    grasps = yaml.safe_load((here / "mug" / "grasps.yaml").read_text())
+    assert grasps["format"] == "isaac_grasp"
+    assert "recommended" in grasps["grasps"]
+    assert len(grasps["grasps"]["recommended"]["cspace_position"]) == 20
+    page = (here / "mug" / "report.html").read_text(encoding="utf-8")
+    assert "scene-data" in page
+    assert "the hand is off" in page
+
+
+def test_doctor_version_and_help(capsys):
+    assert run(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "numba" in out
+    assert "compiled kernels" in out
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("surehold 0.")
+    assert run(["grasp", "--help"]) == 0
+    assert "--facet" in capsys.readouterr().out
+
+
+def test_the_module_is_the_command(here):
+    done = subprocess.run(
+        [sys.executable, "-m", "surehold", "maximize", "nothing"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: problem 'nothing' is unknown")
+    assert done.stdout == ""
