@@ -13,6 +13,7 @@ Beyond the grid the distance to the object's box is returned: a lower bound, and
 
 import hashlib
 import os
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -108,9 +109,11 @@ def _mesh_distance(obj: GraspObject, points: NDArray[np.float64]) -> tuple[NDArr
             f"object '{obj.name}' is a mesh of its own, whose distances libigl computes; pip install libigl."
         ) from error
 
-    kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
-    result = igl.signed_distance(points, obj.vertices, obj.faces.astype(np.int64), sign_type=kind)
-    distance, closest = np.asarray(result[0], dtype=np.float64), np.asarray(result[2], dtype=np.float64)
+    faces = obj.faces.astype(np.int64)
+    squared, _, nearest = igl.point_mesh_squared_distance(points, obj.vertices, faces)
+    inside = np.asarray(igl.fast_winding_number(obj.vertices, faces, points)) > 0.5  # small holes do no harm
+    closest = np.asarray(nearest, dtype=np.float64)
+    distance = np.sqrt(np.asarray(squared, dtype=np.float64)) * np.where(inside, -1.0, 1.0)
     away = points - closest
     length = np.linalg.norm(away, axis=1)
     gradient = away * (np.where(distance < 0.0, -1.0, 1.0) / np.where(length > 0.0, length, 1.0))[:, None]
@@ -140,7 +143,8 @@ def _store(path: Path, nodes: NDArray[np.float32]) -> None:
             np.save(file, nodes)
         scratch.replace(path)  # whole files only, whoever else computes the same
     except OSError:
-        scratch.unlink(missing_ok=True)
+        with suppress(OSError):
+            scratch.unlink()
 
 
 @njit(cache=True)

@@ -99,7 +99,7 @@ def _capsule(
         np.column_stack([radius * np.cos(a) * ring, np.full(_AROUND, h)]) for a, h in zip(latitude, height, strict=True)
     ]
     local = np.vstack([*rings, [[0.0, 0.0, -radius], [0.0, 0.0, length + radius]]])
-    return near + local @ frame.T, _ring_faces(2 * _CAP, _AROUND)
+    return np.asarray(near + local @ frame.T, dtype=np.float64), _ring_faces(2 * _CAP, _AROUND)
 
 
 def _ring_faces(rings: int, around: int) -> NDArray[np.int32]:
@@ -125,6 +125,6 @@ def _rounded_box(half: NDArray[np.float64], rounding: float) -> tuple[NDArray[np
     lat, lon = np.repeat(latitude, around), np.tile(turn, rings)
     unit = np.column_stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
     poles = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
-    unit: NDArray[np.float64] = np.vstack([unit, poles])
+    unit = np.vstack([unit, poles])
     apart = np.where(np.abs(unit) < 1e-12, 0.0, np.sign(unit)) * core
-    return rounding * unit + apart, _ring_faces(rings, around)
+    return np.asarray(rounding * unit + apart, dtype=np.float64), _ring_faces(rings, around)

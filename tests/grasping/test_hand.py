@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from surehold.errors import InputError
+from surehold.grasping.closing import link_ends
+from surehold.grasping.hand import FINGERS, PALM, hand_named, icub_left_hand, link_name
+from surehold.grasping.synergy import S1_USEFUL, power_grasp
+
+
+def transform(rotation=None, shift=(0.0, 0.0, 0.0)):
+    t = np.eye(4)
+    if rotation is not None:
+        t[:3, :3] = rotation.as_matrix()
+    t[:3, 3] = shift
+    return t
+
+
+def denavit_hartenberg(q, a, d=0.0, twist=0.0):
+    turn, tilt = Rotation.from_euler("z", q), Rotation.from_euler("x", twist, degrees=True)
+    return transform(turn) @ transform(shift=(a, 0, 0)) @ transform(tilt) @ transform(shift=(0, 0, d))
+
+
+#: base x, y, z [mm], base roll, pitch, yaw [deg], a1, d, a2, a3 [mm]: the published table
+TABLE = {
+    "index": (64.25, 26.22, -6.7, 5, 0, 4.1, 14.8, 1.75, 25.9, 22),
+    "middle": (65, 9.77, -7.6, 0, 0, 0, 15.3, 2.2, 25.8, 24),
+    "ring": (64.13, -5.65, -7, -5, 0, -6.1, 14.8, 1.75, 25.9, 22),
+    "little": (62.11, -24.54, -6, -5, 0, -6.1, 14.8, -1.75, 21.9, 19),
+    "thumb": (39, 12, 2.5, 0, 4.76364, -29.04, 21.1, -4.9, 26, 22),
+}
+
+
+@pytest.mark.parametrize("finger", FINGERS)
+def test_forward_kinematics_equals_a_product_of_matrices(finger):
+    hand, f = icub_left_hand(), FINGERS.index(finger)
+    x, y, z, roll, pitch, yaw, a1, d, a2, a3 = TABLE[finger]
+    base = transform(Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=True), (x, y, z))
+    if finger == "thumb":
+        base = base @ transform(Rotation.from_euler("xyz", [90, 0, 90], degrees=True))
+    q = np.random.default_rng(f).uniform(hand.lower, hand.upper)
+    ends = 1e3 * link_ends(hand.bases, hand.chains, q)[4 * f : 4 * f + 4]
+    frames = [base, base @ denavit_hartenberg(q[f, 0], a1, d, 90)]
+    frames.append(frames[-1] @ denavit_hartenberg(q[f, 1], a2))
+    frames.append(frames[-1] @ denavit_hartenberg(q[f, 2], a3))
+    for k in range(4):
+        np.testing.assert_allclose(ends[k, 0], frames[k][:3, 3], atol=1e-10)
+    tip = frames[3] @ denavit_hartenberg(q[f, 3], 0) @ np.append(14.5 * np.array([18, 5, 0]) / np.hypot(18, 5), 1)
+    np.testing.assert_allclose(ends[3, 1], tip[:3], atol=1e-10)
+
+
+def test_reach_bounds_every_distance_to_a_joint():
+    hand, rng = icub_left_hand(), np.random.default_rng(0)
+    reach = hand.reach()
+    for _ in range(200):
+        ends = link_ends(hand.bases, hand.chains, rng.uniform(hand.lower, hand.upper)).reshape(5, 4, 2, 3)
+        for j in range(4):
+            for k in range(j, 4):
+                far = np.linalg.norm(ends[:, k] - ends[:, j, :1], axis=-1).max(axis=1)
+                assert np.all(far <= reach[:, j, k] + 1e-12)
+
+
+def test_power_grasp_follows_the_published_synergy():
+    hand = icub_left_hand()
+    mean = np.array([33.5561, 51.8757, 10, 5, 5, 5, 5, 5, 5])
+    closure = np.array([-0.20, 0, -0.05, -0.90, -0.35, -0.40, -0.35, -0.40, -0.32])
+    posture = np.array([0, -0.9232, -0.0415, 0.1669, -0.0491, -0.1012, -0.0381, -0.0160, 0])
+    for c0, s1 in ((np.pi, 0.0), (0.1, -0.8), (-2.0, 0.9), (-np.pi, -1.1)):
+        a = mean + np.degrees(c0 * closure + s1 * posture)
+        expected = np.array(
+            [
+                [0.08 * a[0], a[4], 0.6 * a[5], 0.4 * a[5]],
+                [0.0, a[6], 0.6 * a[7], 0.4 * a[7]],
+                [-0.05 * a[0], a[8], 0.9 * a[8], 0.6 * a[8]],
+                [-0.10 * a[0], a[8], 0.9 * a[8], 0.6 * a[8]],
+                [a[1], a[2], 0.6 * a[3], 0.4 * a[3]],
+            ]
+        )
+        expected = np.clip(expected, np.degrees(hand.lower), np.degrees(hand.upper))
+        np.testing.assert_allclose(np.degrees(power_grasp(hand, s1).joints(np.pi - c0)), expected, atol=1e-9)
+
+
+def test_thumb_opposition_is_at_its_ends_outside_the_useful_range():
+    hand = icub_left_hand()
+    lowest, highest = (power_grasp(hand, s).joints(0.0)[4, 0] for s in S1_USEFUL[::-1])
+    assert np.degrees(lowest) == pytest.approx(0.0, abs=0.2)
+    assert np.degrees(highest) == pytest.approx(120.0, abs=0.2)
+
+
+def test_fingers_bend_out_of_the_palm_and_the_thumb_opposes_them():
+    hand = icub_left_hand()
+    closed = link_ends(hand.bases, hand.chains, power_grasp(hand).joints(4.5))
+    for f in range(4):
+        assert closed[4 * f + 3, 1, 2] > 0.03, "a fingertip stands above the palm"
+    thumb, middle = closed[19], closed[7]
+    assert thumb[1, 0] < middle[1, 0], "the thumb tip is nearer to the wrist than the fingertips"
+    assert (thumb[1] - thumb[0])[0] > 0.0 > (middle[1] - middle[0])[0] - 0.02
+
+
+def test_names():
+    assert link_name(PALM) == "palm"
+    assert link_name(0) == "index knuckle"
+    assert link_name(19) == "thumb distal"
+    with pytest.raises(InputError, match="icub-left"):
+        hand_named("shadow")
