@@ -118,9 +118,9 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, max_facets):
         mark[nearest] = step
         seen[0] = nearest
         n_seen, n_horizon = _see(s, tolerance, vertices, neighbors, planes, height, mark, seen, horizon, step)
-        if n_facets + n_horizon > max_facets or 8 * n_horizon > cells:
+        if n_facets + n_horizon > max_facets or 8 * n_horizon >= cells:
             return SPENT, lower, upper, u, step - 1, n_facets
-        if not _join(
+        if n_horizon < 6 or not _join(
             added, n_facets, n_horizon, vertices, neighbors, planes, height, mark, horizon, table, owner, stamp, step
         ):
             return FAILED, lower, upper, u, step, n_facets

@@ -1,0 +1,94 @@
+"""Time of epsilon beside SciPy's Qhull on the same wrenches, in one run, one thread.
+
+Run `python benchmarks/wrench_quality.py`. Sets: contacts spread over a ball, and soft contacts in five patches with graded
+weights; friction cones of 8 edges. Columns, milliseconds, median over the sets: `ours` (`ball_radius`) and its slowest;
+`whole`, `wrench_quality` with all checks from points and normals; `round`, the same with exact round cones; Qhull with
+`QJ Pp` (robust) and with SciPy's default options, on fewer sets because it is slow; `refused`, how many of these the
+default options refused. Then the ratio of `QJ Pp` to `ours`, the largest difference of epsilon, and the sets in closure.
+"""
+
+import os
+from statistics import median
+from time import perf_counter
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from surehold.grasping.contact_wrenches import contact_wrenches
+from surehold.grasping.inscribed_ball import ball_radius
+from surehold.grasping.wrench_space import wrench_quality
+
+
+def spread_contacts(rng, c):
+    points = rng.normal(size=(c, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    normals = -points + 0.3 * rng.normal(size=(c, 3))
+    return points, normals / np.linalg.norm(normals, axis=1)[:, None], np.ones(c)
+
+
+def patch_contacts(rng, c):
+    patches = 5
+    middle = rng.normal(size=(patches, 3))
+    middle /= np.linalg.norm(middle, axis=1)[:, None]
+    points, normals = [], []
+    for n in middle:
+        offsets = 0.05 * rng.normal(size=(c // patches, 3))
+        offsets -= np.outer(offsets @ n, n)
+        tilted = n + 0.05 * rng.normal(size=offsets.shape)
+        points.append(offsets - n)
+        normals.append(tilted / np.linalg.norm(tilted, axis=1)[:, None])
+    return np.concatenate(points), np.concatenate(normals), rng.uniform(0.05, 1.0, patches * (c // patches))
+
+
+def milliseconds(function, *arguments, **options):
+    start = perf_counter()
+    result = function(*arguments, **options)
+    return 1e3 * (perf_counter() - start), result
+
+
+def hull_epsilon(wrenches, options):
+    return max(-ConvexHull(wrenches, qhull_options=options).equations[:, -1].max(), 0.0)
+
+
+def measure(name, contacts, c, sets, hull_sets):
+    rng = np.random.default_rng(0)
+    ours, whole, rounded, joggled, default, worst, refused, closed = [], [], [], [], [], 0.0, 0, 0
+    for k in range(sets):
+        points, normals, weights = contacts(rng, c)
+        wrenches = contact_wrenches(points, normals, weights=weights)
+        time, epsilon = milliseconds(ball_radius, wrenches)
+        ours.append(time)
+        closed += epsilon > 0.0
+        whole.append(milliseconds(wrench_quality, points, normals, weights=weights)[0])
+        rounded.append(milliseconds(wrench_quality, points, normals, weights=weights, cones="round")[0])
+        if k < hull_sets:
+            time, full = milliseconds(hull_epsilon, wrenches, "QJ Pp")
+            joggled.append(time)
+            worst = max(worst, abs(full - epsilon))
+            try:
+                default.append(milliseconds(hull_epsilon, wrenches, None)[0])
+            except QhullError:
+                refused += 1
+    ratio = median(joggled) / median(ours)
+    plain = f"{median(default):8.1f}" if default else "       -"
+    print(
+        f"{name:8} {c:4} x 8 {median(ours):8.2f} {max(ours):8.2f} {median(whole):8.2f} {median(rounded):8.2f}"
+        f" {median(joggled):8.1f} {plain} {refused:4}/{hull_sets:<3} {ratio:7.0f} {worst:9.1e} {closed:5}/{sets}"
+    )
+
+
+def main():
+    ball_radius(contact_wrenches(*spread_contacts(np.random.default_rng(1), 6)[:2]))  # compile
+    print(
+        f"{'set':8} {'contacts':>8} {'ours':>8} {'slowest':>8} {'whole':>8} {'round':>8} {'QJ Pp':>8} {'default':>8}"
+        f" {'refused':>8} {'ratio':>7} {'differs':>9} {'closed':>9}"
+    )
+    for name, contacts in (("spread", spread_contacts), ("patches", patch_contacts)):
+        for c, sets, hull_sets in ((5, 200, 50), (10, 200, 20), (40, 100, 5), (100, 50, 1)):
+            measure(name, contacts, c, sets, hull_sets)
+
+
+if __name__ == "__main__":
+    main()
