@@ -110,7 +110,7 @@ def recommendation(
     if np.any(np.abs(highest[0] - u) > 1e-6):
         other = outcome_of(posterior, reached, highest[0])
         refused = (
-            f"The highest observed trial gave {highest[1]:.4g}, but {other.mean:.4g} is expected of it under the noise, "
+            f"The highest observed trial gave {highest[1]:.4g}, but under the noise {other.mean:.4g} is expected, "
             f"and less than {other.quantile(_LEVEL):.4g} once in twenty executions; of the recommended one "
             f"{outcome.mean:.4g} is expected, and less than {outcome.quantile(_LEVEL):.4g} once in twenty."
         )
