@@ -1,15 +1,16 @@
-"""Time of epsilon beside SciPy's Qhull on the same wrenches, in one run, one thread.
+"""CPU time of epsilon beside SciPy's Qhull on the same wrenches, in one run, one thread.
 
-Run `python benchmarks/wrench_quality.py`. Sets: contacts spread over a ball, and soft contacts in five patches with graded
-weights; friction cones of 8 edges. Columns, milliseconds, median over the sets: `ours` (`ball_radius`) and its slowest;
-`whole`, `wrench_quality` with all checks from points and normals; `round`, the same with exact round cones; Qhull with
-`QJ Pp` (robust) and with SciPy's default options, on fewer sets because it is slow; `refused`, how many of these the
-default options refused. Then the ratio of `QJ Pp` to `ours`, the largest difference of epsilon, and the sets in closure.
+Run `python benchmarks/wrench_quality.py`. Sets: contacts spread over a ball, and soft contacts in five patches with
+graded weights; friction cones of 8 edges. Columns, CPU milliseconds, median over the sets: `ours` (`ball_radius`) and
+its slowest; `whole`, `wrench_quality` with all checks from points and normals; `round`, the same with exact round
+cones; Qhull with `QJ Pp` (robust) and with SciPy's default options, on fewer sets because it is slow; `refused`, how
+many of these the default options refused. Then the ratio of `QJ Pp` to `ours`, the largest difference of epsilon, and
+the sets in closure.
 """
 
 import os
 from statistics import median
-from time import perf_counter
+from time import thread_time
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -43,9 +44,9 @@ def patch_contacts(rng, c):
 
 
 def milliseconds(function, *arguments, **options):
-    start = perf_counter()
+    start = thread_time()
     result = function(*arguments, **options)
-    return 1e3 * (perf_counter() - start), result
+    return 1e3 * (thread_time() - start), result
 
 
 def hull_epsilon(wrenches, options):

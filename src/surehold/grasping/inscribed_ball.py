@@ -25,7 +25,9 @@ __all__ = ["InscribedBall", "ball_radius", "hull_volume", "inscribed_ball", "nea
 TOLERANCES = (1e-11, 1e-9)
 """Tried in turn: distances below this fraction of the largest wrench count as zero."""
 FACET_BUDGETS = (4096, 65_536, 1_048_576)
-"""Memory for so many facets is tried in turn; grasps need hundreds to thousands. Round cones stop at the second."""
+"""Memory for so many facets is tried in turn; grasps need hundreds to thousands."""
+ROUND_FACET_BUDGETS = (16_384, 65_536)
+"""The same for round cones, which need more and, stopped, are bounded all the same."""
 MAX_WRENCHES = 65_535  # the compiled expansion packs four indices of wrenches into 64 bits
 ROUND_GAP = 1e-9
 """Difference of the bounds at which round cones count as measured, as a fraction of the largest wrench.
@@ -163,10 +165,11 @@ def _expand(
         return FLAT, 0.0, 0.0, flat, 0, 0, 0
     centers, axes = round_contacts or _NO_ROUND
     gap = ROUND_GAP if len(centers) else 0.0
+    budgets = ROUND_FACET_BUDGETS if len(centers) else FACET_BUDGETS
     attempts = TOLERANCES if len(w) <= MAX_WRENCHES else ()
     for fallbacks, tolerance in enumerate(attempts):
-        result = expand_nearest(w, centers, axes, tolerance, gap, FACET_BUDGETS[0])
-        for budget in FACET_BUDGETS[1 : 2 if len(centers) else None]:
+        result = expand_nearest(w, centers, axes, tolerance, gap, budgets[0])
+        for budget in budgets[1:]:
             if result[0] != SPENT:
                 break
             result = expand_nearest(w, centers, axes, tolerance, gap, budget)
