@@ -58,7 +58,7 @@ def test_no_touch_is_missed_on_the_way(closing):
             joints = np.minimum(motion.joints(t), grasp.joints)
             joints[:, 0] = grasp.joints[:, 0]
             ends = ends_in_object_frame(simulator, pose, joints)
-            for body in range(0, 20):
+            for body in range(20):
                 if body % 4:
                     assert exact.capsule(ends[body, 0], ends[body, 1], radius) > -_MESH
 
@@ -78,7 +78,7 @@ def test_a_stopped_joint_would_run_into_something():
 
 def test_closing_follows_the_synergy_until_the_touch():
     simulator = Simulator(obj="mug", contact="single", closing="synergy")
-    for pose, s1, grasp in trials(simulator, "right-front", 0.02, 10, 4):
+    for _, s1, grasp in trials(simulator, "right-front", 0.02, 10, 4):
         motion = power_grasp(simulator.hand, s1)
         for f in range(5):
             t = np.linspace(0.0, CLOSED, 20_001)

@@ -182,7 +182,7 @@ class Simulator:
     def gaps(self, pose: Pose, joints: ArrayLike, geometry: _Geometry | None = None) -> Array:
         """Return the gaps (21,) between the object and the hand's bodies at rest [m], the palm last.
 
-        Negative values are rough depths. The gap of the palm is exact up to 10 mm, beyond that only known to be larger.
+        Negative values are rough depths; gaps above 5 mm are lower bounds.
 
         Parameters
         ----------
@@ -202,7 +202,7 @@ class Simulator:
             placed.palm,
             self.hand.palm_half_extents,
             self.hand.palm_rounding,
-            0.010,
+            0.005,
         )
 
     def warm_up(self) -> None:

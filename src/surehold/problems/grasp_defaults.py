@@ -7,9 +7,11 @@ takes the one with the highest mean quality; without such a pair, the one neares
 `python -m surehold.problems.grasp_defaults` repeats the search for the shipped objects and prints the table below.
 """
 
+import sys
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surehold.grasping.grasp import Simulator
 from surehold.grasping.meshes import OBJECTS
@@ -30,7 +32,30 @@ _POSTURES: Final = (-1.2, -0.95, -0.7, -0.45, -0.2, 0.1)
 
 #: (object, mode) -> standoff [mm], s1 [rad]; printed by this module
 _TABLE: Final[dict[tuple[str, str], tuple[float, float]]] = {
-    ("mug", "right-front"): (20.0, -0.70),
+    ("mug", "right-front"): (21.1, -0.70),
+    ("mug", "right-back"): (21.1, -0.70),
+    ("mug", "right-top"): (28.9, -0.20),
+    ("mug", "right-bottom"): (28.9, -0.45),
+    ("mug", "front-right"): (39.2, -0.95),
+    ("mug", "front-left"): (39.2, -0.95),
+    ("mug", "front-top"): (49.0, -1.20),
+    ("mug", "front-bottom"): (49.0, -1.20),
+    ("mug", "left-front"): (21.1, -0.70),
+    ("mug", "left-back"): (21.1, -0.70),
+    ("mug", "left-top"): (28.9, -0.45),
+    ("mug", "left-bottom"): (28.9, -0.20),
+    ("mug", "back-right"): (49.0, -1.20),
+    ("mug", "back-left"): (49.0, -1.20),
+    ("mug", "back-top"): (39.2, -0.95),
+    ("mug", "back-bottom"): (39.2, -1.20),
+    ("mug", "top-right"): (33.1, -0.20),
+    ("mug", "top-front"): (33.1, -0.45),
+    ("mug", "top-left"): (33.1, -0.70),
+    ("mug", "top-back"): (33.1, -0.70),
+    ("mug", "bottom-right"): (33.1, 0.10),
+    ("mug", "bottom-front"): (50.3, -1.20),
+    ("mug", "bottom-left"): (33.1, -1.20),
+    ("mug", "bottom-back"): (50.3, -1.20),
 }
 
 
@@ -46,11 +71,11 @@ def search_default(simulator: Simulator, mode: str) -> GraspDefault:
     """Search standoff and s1 of a mode as the module says."""
     along, across, depth = np.abs(facet_axes(mode).T) @ simulator.object.box_half_extents
     best, best_score = GraspDefault(depth, 0.0), (-np.inf, -np.inf)
-    for standoff in np.round(np.linspace(depth / 3.0, depth + 0.020, 7), 4):
+    for standoff in np.round(np.linspace(depth / 3.0, depth + 0.020, 10), 4):
         for s1 in _POSTURES:
             qualities, free = [], 0
-            for dx in np.linspace(-along - 0.025, along + 0.025, 15):
-                for dy in np.linspace(-across, across, 7):
+            for dx in (along + 0.025) * _middles(15):
+                for dy in across * _middles(7):
                     pose = default_pose(simulator.hand, simulator.object, mode, float(standoff), (dx, dy, 0, 0, 0, 0))
                     outcome = simulator.grasp(pose, s1)
                     free += outcome.status != "initial collision"
@@ -63,8 +88,13 @@ def search_default(simulator: Simulator, mode: str) -> GraspDefault:
     return best
 
 
+def _middles(n: int) -> NDArray[np.float64]:
+    """Return the middles of n equal parts of [-1, 1]."""
+    return (2.0 * np.arange(n) + 1.0) / n - 1.0
+
+
 def _main() -> None:
-    for name in OBJECTS:
+    for name in sys.argv[1:] or OBJECTS:
         simulator = Simulator(obj=name)
         for mode in MODES:
             found = search_default(simulator, mode)

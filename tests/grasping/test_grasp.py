@@ -1,0 +1,130 @@
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from surehold.errors import InputError
+from surehold.grasping import OBJECTS, STATUSES, Pose, Simulator, default_pose, wrench_quality
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    return Simulator("icub-left", "mug")
+
+
+def pose_of(simulator, dx=-0.057, dy=0.0, standoff=0.021, mode="right-front"):
+    return default_pose(simulator.hand, simulator.object, mode, standoff, (dx, dy, 0.0, 0.0, 0.0, 0.0))
+
+
+def random_pose(simulator, rng):
+    mode = ("right-front", "front-left", "top-left", "back-top")[rng.integers(4)]
+    half = simulator.object.box_half_extents
+    offsets = rng.uniform(-1, 1, 6) * np.array([0.09, half[2], 0.02, 0.7, 0.7, 0.7])
+    return default_pose(simulator.hand, simulator.object, mode, float(rng.uniform(0.01, 0.09)), offsets)
+
+
+def test_each_status_and_its_quality(simulator):
+    held = simulator.grasp(pose_of(simulator), -0.7)
+    assert held.status == "ok"
+    assert held.quality > 0.05
+    assert {name.split()[0] for name in held.touching} >= {"thumb", "index", "middle", "ring"}
+    inside = simulator.grasp(pose_of(simulator, dx=0.0), -0.7)
+    assert (inside.status, inside.quality, len(inside.contacts)) == ("initial collision", 0.0, 0)
+    assert inside.penetration > 0.001
+    away = simulator.grasp(pose_of(simulator, standoff=0.4), -0.7)
+    assert (away.status, away.quality, away.penetration) == ("no contact", 0.0, 0.0)
+    loose = simulator.grasp(pose_of(simulator, standoff=0.062, dx=-0.07), -0.7)
+    assert loose.quality == 0.0
+    assert loose.status in ("not closed", "no contact")
+
+
+def test_quality_is_the_wrench_measure_of_its_contacts(simulator):
+    grasp = simulator.grasp(pose_of(simulator), -0.7)
+    contacts, mug = grasp.contacts, simulator.object
+    expected = wrench_quality(
+        contacts.points, contacts.normals, 0.5, 8, mug.torque_length, mug.center_of_mass, weights=contacts.weights
+    )
+    assert grasp.quality == expected.epsilon
+    volume = Simulator(obj="bottle", quality="volume", contact="single")
+    found = volume.grasp(pose_of(volume, dx=-0.02, standoff=0.012), -0.45)
+    if found.status == "ok":
+        assert found.wrench is not None
+        assert found.quality == found.wrench.volume > 0.0
+
+
+def test_moving_hand_and_object_together_changes_nothing(simulator):
+    rng = np.random.default_rng(0)
+    for _ in range(12):
+        motion = Pose(tuple(rng.uniform(-1, 1, 3)), tuple(Rotation.random(rng=rng).as_quat(scalar_first=True)))
+        there = Simulator(obj="mug", object_pose=motion)
+        pose = pose_of(simulator, dx=float(rng.uniform(-0.07, -0.05)), dy=float(rng.uniform(-0.02, 0.02)))
+        here, moved = simulator.grasp(pose, -0.7), there.grasp(motion @ pose, -0.7)
+        assert here.quality > 0.0
+        assert moved.quality == pytest.approx(here.quality, abs=1e-9)
+        assert moved.status == here.status
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_random_poses_give_finite_results_and_repeat(name):
+    simulator, rng = Simulator(obj=name), np.random.default_rng(1)
+    seen = set()
+    for _ in range(150):
+        pose, s1 = random_pose(simulator, rng), float(rng.uniform(-np.pi, np.pi))
+        grasp = simulator.grasp(pose, s1)
+        seen.add(grasp.status)
+        assert grasp.status in STATUSES
+        assert np.isfinite(grasp.quality)
+        assert (grasp.quality > 0.0) == (grasp.status == "ok")
+        assert np.all(grasp.joints >= simulator.hand.lower - 1e-12)
+        assert np.all(grasp.joints <= simulator.hand.upper + 1e-12)
+        assert simulator.grasp(pose, s1).quality == grasp.quality
+    assert len(seen) >= 2
+
+
+def test_scene_holds_watertight_bodies_in_the_world(simulator):
+    motion = Pose((0.3, -0.2, 0.1), tuple(Rotation.from_euler("xyz", [0.4, 0.2, -0.9]).as_quat(scalar_first=True)))
+    there = Simulator(obj="mug", object_pose=motion)
+    grasp = there.grasp(motion @ pose_of(there), -0.7)
+    scene, opened = there.scene(grasp), there.scene(grasp, opened=True)
+    assert len(scene.hand) == 21
+    for body in (scene.object, *scene.hand, *opened.hand):
+        assert body.vertices.dtype == np.float32
+        assert body.faces.dtype == np.int32
+        mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
+        assert mesh.is_watertight, body.name
+        assert mesh.volume > 0.0, f"{body.name} is inside out"
+    surface = motion.inverse().apply(scene.points.astype(float))
+    assert np.abs(there.field.distance(surface)).max() < 2e-4
+    assert len(scene.bodies) == len(scene.points) == len(scene.weights) == len(grasp.contacts)
+    assert len(opened.points) == 0
+    palm = next(body for body in scene.hand if body.name == "palm")
+    expected = 8 * np.prod(there.hand.palm_half_extents)
+    assert 0.85 * expected < trimesh.Trimesh(palm.vertices, palm.faces, process=False).volume < expected
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"obj": "mugg"}, "did you mean 'mug'"),
+        ({"hand": "shadow"}, "hand 'shadow' is unknown"),
+        ({"contact": "soft"}, "graded, patch, single"),
+        ({"quality": "epsilom"}, "did you mean 'epsilon'"),
+        ({"closing": "fast"}, "adaptive, synergy"),
+        ({"friction": -0.1}, "friction is -0.1"),
+        ({"friction": float("nan")}, "friction is nan"),
+        ({"edges": 2}, "edges of the friction cone are 2"),
+        ({"edges": True}, "edges"),
+        ({"depth": 0.0}, "depth of the soft touch"),
+        ({"depth": 0.1}, "depth of the soft touch"),
+    ],
+)
+def test_bad_options_are_explained(options, words):
+    with pytest.raises(InputError, match=words):
+        Simulator(**options)
+
+
+def test_poses_that_are_not_finite_are_refused(simulator):
+    with pytest.raises(InputError, match="finite"):
+        simulator.grasp(Pose((float("nan"), 0.0, 0.0)))
+    with pytest.raises(InputError, match="finite"):
+        simulator.grasp(Pose(), float("inf"))
