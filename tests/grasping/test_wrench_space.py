@@ -322,3 +322,35 @@ def test_hundreds_of_near_duplicates_are_measured():
         alone = wrench_quality(points[::8], normals[::8])
         assert q.epsilon == pytest.approx(alone.epsilon, abs=1e-3)
         assert q.epsilon >= alone.epsilon - 1e-8, f"set {k}: more contacts, smaller ball"
+
+
+def test_epsilon_moves_no_more_than_the_wrenches():
+    rng = np.random.default_rng(14)
+    for _ in range(60):
+        points, normals, weights = clustered_contacts(rng, 5, 8, 0.05, flat=False)
+        step = 10.0 ** rng.uniform(-9, -2)
+        moved = np.clip(weights + step * rng.normal(size=weights.shape), 0.0, 1.0)
+        turned = normals + step * rng.normal(size=normals.shape)
+        turned /= np.linalg.norm(turned, axis=1)[:, None]
+        shifted = points + step * rng.normal(size=points.shape)
+        here, there = wrench_quality(points, normals, weights=weights), wrench_quality(shifted, turned, weights=moved)
+        kept = np.repeat(moved[weights > 0.0] > 0.0, 8)
+        displacement = here.wrenches.copy()
+        displacement[kept] -= there.wrenches[np.repeat(weights[moved > 0.0] > 0.0, 8)]
+        bound = np.sqrt((displacement**2).sum(axis=1)).max()
+        assert abs(here.epsilon - there.epsilon) <= bound + 1e-10
+
+
+def test_volume_of_a_thin_hull():
+    rng = np.random.default_rng(15)
+    w = rng.normal(size=(30, 6))
+    volume = ConvexHull(w, qhull_options="QJ Pp").volume
+    for thickness in (1.0, 1e-3, 1e-6, 1e-9):
+        thin = w * [1, 1, 1, 1, 1, thickness]
+        assert hull_volume(thin) == pytest.approx(volume * thickness, rel=1e-5)
+    assert hull_volume(w * [1, 1, 1, 1, 1, 0]) == 0.0
+
+
+def test_too_many_wrenches_are_refused():
+    with pytest.raises(InputError, match="65535 can be measured"):
+        inscribed_ball(np.random.default_rng(16).normal(size=(65_536, 6)))

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.errors import InputError
 from surehold.grasping.contact_wrenches import RoundContacts, finite_array
 from surehold.grasping.nearest_facet import DONE, FAILED, FLAT, OUTSIDE, SPENT, expand_nearest
 
@@ -76,7 +77,8 @@ def ball_radius(wrenches: NDArray[np.float64], round_contacts: RoundContacts | N
 def inscribed_ball(wrenches: ArrayLike, round_contacts: RoundContacts | None = None) -> InscribedBall:
     """Return the largest origin-centered ball in the hull of wrenches (m, 6), signed, with bounds and diagnostics.
 
-    Round contacts as in `ball_radius`. Raises InputError if the wrenches are not finite or not of shape (m, 6).
+    Round contacts as in `ball_radius`. Raises InputError if the wrenches are not finite, not of shape (m, 6), or
+    more than 65,535.
     """
     w = np.ascontiguousarray(finite_array("wrenches", wrenches, (None, 6)))
     status, lower, upper, normal, expansions, facets, fallbacks = _expand(w, round_contacts)
@@ -147,10 +149,11 @@ def hull_volume(wrenches: ArrayLike) -> float:
     w = np.asarray(wrenches, float)
     if len(w) <= w.shape[1]:
         return 0.0
-    spread = np.linalg.svd(w - w.mean(axis=0), compute_uv=False)
+    u, spread, _ = np.linalg.svd(w - w.mean(axis=0), full_matrices=False)
     if spread[-1] <= TOLERANCES[0] * spread[0]:
         return 0.0
-    return float(ConvexHull(w, qhull_options="QJ Pp").volume)
+    # Qhull joggles points by a fraction of their largest coordinate, so give it equal widths in all directions
+    return float(ConvexHull(u, qhull_options="QJ Pp").volume * np.prod(spread))
 
 
 def _expand(
@@ -163,11 +166,12 @@ def _expand(
     flat = np.zeros(6)
     if len(w) < 7:
         return FLAT, 0.0, 0.0, flat, 0, 0, 0
+    if len(w) > MAX_WRENCHES:
+        raise InputError(f"{len(w)} wrenches are too many, {MAX_WRENCHES} can be measured; merge contacts.")
     centers, axes = round_contacts or _NO_ROUND
     gap = ROUND_GAP if len(centers) else 0.0
     budgets = ROUND_FACET_BUDGETS if len(centers) else FACET_BUDGETS
-    attempts = TOLERANCES if len(w) <= MAX_WRENCHES else ()
-    for fallbacks, tolerance in enumerate(attempts):
+    for fallbacks, tolerance in enumerate(TOLERANCES):
         result = expand_nearest(w, centers, axes, tolerance, gap, budgets[0])
         for budget in budgets[1:]:
             if result[0] != SPENT:
