@@ -23,7 +23,14 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, SureholdError, unknown_name
 from surehold.optimization.hyperparameters import Learning, Prior, from_prior, learn
 from surehold.optimization.kernels import correlation_and_factor, cross_correlation, kernel_number
-from surehold.optimization.likelihood import Evidence, cholesky, data_covariance, solve_lower, solve_lower_transposed
+from surehold.optimization.likelihood import (
+    Evidence,
+    cholesky,
+    data_covariance,
+    invert_lower,
+    solve_lower,
+    solve_lower_transposed,
+)
 from surehold.optimization.outputs import Standardization, checked_range
 from surehold.optimization.surrogate import FitDiagnostics, Moments, Posterior, mixture
 
@@ -52,14 +59,7 @@ def _factorize(X, Y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, inve
         alpha[j] = Y[j]
         solve_lower(A, alpha[j])
         solve_lower_transposed(A, alpha[j])
-        L = inverse_L[j]
-        L[:] = 0.0
-        for c in range(n):  # row i of L^-1 from the rows above it, each access along a row
-            L[c, c] = 1.0 / A[c, c]
-            for k in range(c):
-                t = A[c, k] * L[c, c]
-                for i in range(k + 1):
-                    L[c, i] -= t * L[k, i]
+        invert_lower(A, inverse_L[j])
     return repaired
 
 

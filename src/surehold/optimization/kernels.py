@@ -17,7 +17,7 @@ With g, every derivative that is needed has no singularity:
 (Rasmussen and Williams 2006, section 4.2.)
 """
 
-from math import exp, sqrt
+from math import sqrt
 from typing import Final
 
 import numpy as np
@@ -30,6 +30,7 @@ __all__ = ["KERNELS", "correlation_and_factor", "cross_correlation", "kernel_num
 KERNELS: Final = ("matern52", "matern32", "squared_exponential")
 _SQRT3: Final = sqrt(3.0)
 _SQRT5: Final = sqrt(5.0)
+_FAR: Final = 700.0  # beyond this exponent a correlation is 0 in double precision
 
 
 def kernel_number(name: str) -> int:
@@ -40,74 +41,107 @@ def kernel_number(name: str) -> int:
 
 
 @njit(cache=True, inline="always")
-def _correlation(kernel: int, squared: float) -> float:
-    if kernel == 0:
-        r = _SQRT5 * sqrt(squared)
-        return (1.0 + r + r * r / 3.0) * exp(-r)
-    if kernel == 1:
-        r = _SQRT3 * sqrt(squared)
-        return (1.0 + r) * exp(-r)
-    return exp(-0.5 * squared)
+def _exponential(x):
+    """Return exp(x) for x in [-700, 0] to 2 units in the last place, in a form that compilers turn into SIMD code.
+
+    exp(x) = 2^k exp(t) with |t| <= ln 2 / 2 (Cody and Waite 1980), exp(t) by its Taylor polynomial of degree 13; a call
+    of the C library's exp, one element at a time, takes three times as long.
+    """
+    k = np.floor(x * 1.4426950408889634 + 0.5)
+    t = (x - k * 0.693145751953125) - k * 1.4286068203094172e-06
+    p = 1.6059043836821613e-10
+    p = p * t + 2.08767569878681e-09
+    p = p * t + 2.505210838544172e-08
+    p = p * t + 2.755731922398589e-07
+    p = p * t + 2.7557319223985893e-06
+    p = p * t + 2.48015873015873e-05
+    p = p * t + 0.0001984126984126984
+    p = p * t + 0.001388888888888889
+    p = p * t + 0.008333333333333333
+    p = p * t + 0.041666666666666664
+    p = p * t + 0.16666666666666666
+    p = p * t + 0.5
+    p = p * t + 1.0
+    p = p * t + 1.0
+    return p * np.int64((np.int64(k) + np.int64(1023)) << np.int64(52)).view(np.float64)
 
 
-@njit(cache=True, inline="always")
-def _correlation_and_factor(kernel: int, squared: float) -> tuple[float, float]:
+@njit(cache=True, fastmath={"contract"})
+def _transform(kernel, squared):
+    """Overwrite squared scaled distances (n,) with correlations c."""
     if kernel == 0:
-        r = _SQRT5 * sqrt(squared)
-        e = exp(-r)
-        return (1.0 + r + r * r / 3.0) * e, 5.0 / 3.0 * (1.0 + r) * e
-    if kernel == 1:
-        r = _SQRT3 * sqrt(squared)
-        e = exp(-r)
-        return (1.0 + r) * e, 3.0 * e
-    e = exp(-0.5 * squared)
-    return e, e
+        for i in range(squared.size):
+            r = min(_SQRT5 * sqrt(squared[i]), _FAR)
+            squared[i] = (1.0 + r + r * r / 3.0) * _exponential(-r)
+    elif kernel == 1:
+        for i in range(squared.size):
+            r = min(_SQRT3 * sqrt(squared[i]), _FAR)
+            squared[i] = (1.0 + r) * _exponential(-r)
+    else:
+        for i in range(squared.size):
+            squared[i] = _exponential(-min(0.5 * squared[i], _FAR))
+
+
+@njit(cache=True, fastmath={"contract"})
+def _transform_with_factor(kernel, squared, factor):
+    """Overwrite squared scaled distances (n,) with correlations c and fill `factor` (n,) with radial factors g."""
+    if kernel == 0:
+        for i in range(squared.size):
+            r = min(_SQRT5 * sqrt(squared[i]), _FAR)
+            e = _exponential(-r)
+            squared[i] = (1.0 + r + r * r / 3.0) * e
+            factor[i] = 5.0 / 3.0 * (1.0 + r) * e
+    elif kernel == 1:
+        for i in range(squared.size):
+            r = min(_SQRT3 * sqrt(squared[i]), _FAR)
+            e = _exponential(-r)
+            squared[i] = (1.0 + r) * e
+            factor[i] = 3.0 * e
+    else:
+        for i in range(squared.size):
+            e = _exponential(-min(0.5 * squared[i], _FAR))
+            squared[i] = e
+            factor[i] = e
+
+
+@njit(cache=True, fastmath={"contract"})
+def _squared_distances(x, Z, inverse_l, out):
+    """Fill `out` (q,) with || (x - z_j) / l ||^2 for x (d,) and the columns z_j of Z (d, q) that `out` has room for."""
+    out[:] = 0.0
+    for k in range(x.size):
+        scale = inverse_l[k]
+        for j in range(out.size):
+            t = (x[k] - Z[k, j]) * scale
+            out[j] += t * t
 
 
 @njit(cache=True)
 def self_correlation(kernel, X, inverse_l, out):
     """Fill the strict lower triangle of `out` (n, n) with c(x_i, x_j) of X (n, d) and its diagonal with 1."""
-    n, d = X.shape
-    for i in range(n):
-        for j in range(i):
-            squared = 0.0
-            for k in range(d):
-                t = (X[i, k] - X[j, k]) * inverse_l[k]
-                squared += t * t
-            out[i, j] = squared
-    for i in range(n):
-        for j in range(i):
-            out[i, j] = _correlation(kernel, out[i, j])
+    Z = np.ascontiguousarray(X.T)
+    for i in range(X.shape[0]):
+        row = out[i, :i]
+        _squared_distances(X[i], Z, inverse_l, row)
+        _transform(kernel, row)
         out[i, i] = 1.0
 
 
 @njit(cache=True)
 def cross_correlation(kernel, X, Q, inverse_l, out):
     """Fill `out` (n, q) with c(x_i, q_j) of X (n, d) and Q (q, d)."""
-    n, d = X.shape
-    for i in range(n):
-        for j in range(Q.shape[0]):
-            squared = 0.0
-            for k in range(d):
-                t = (X[i, k] - Q[j, k]) * inverse_l[k]
-                squared += t * t
-            out[i, j] = squared
-    for i in range(n):
-        for j in range(Q.shape[0]):
-            out[i, j] = _correlation(kernel, out[i, j])
+    Z = np.ascontiguousarray(Q.T)
+    for i in range(X.shape[0]):
+        _squared_distances(X[i], Z, inverse_l, out[i])
+        _transform(kernel, out[i])
 
 
 @njit(cache=True)
 def correlation_and_factor(kernel, X, Q, inverse_l, out, factor):
     """Fill `out` (n, q) with c(x_i, q_j) and `factor` (n, q) with the radial factor g of the module's legend."""
-    n, d = X.shape
-    for i in range(n):
-        for j in range(Q.shape[0]):
-            squared = 0.0
-            for k in range(d):
-                t = (X[i, k] - Q[j, k]) * inverse_l[k]
-                squared += t * t
-            out[i, j], factor[i, j] = _correlation_and_factor(kernel, squared)
+    Z = np.ascontiguousarray(Q.T)
+    for i in range(X.shape[0]):
+        _squared_distances(X[i], Z, inverse_l, out[i])
+        _transform_with_factor(kernel, out[i], factor[i])
 
 
 def correlation(kernel: str, X: np.ndarray, Q: np.ndarray, length_scales: np.ndarray) -> np.ndarray:
@@ -117,7 +151,7 @@ def correlation(kernel: str, X: np.ndarray, Q: np.ndarray, length_scales: np.nda
         kernel_number(kernel),
         np.ascontiguousarray(X, dtype=np.float64),
         np.ascontiguousarray(Q, dtype=np.float64),
-        1.0 / np.asarray(length_scales, dtype=np.float64),
+        1.0 / np.asarray(length_scales, dtype=np.float64).ravel(),
         out,
     )
     return out

@@ -153,6 +153,21 @@ def solve_lower_transposed(L, b):
             b[k] -= L[i, k] * t
 
 
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def invert_lower(L, inverse):
+    """Fill `inverse` (n, n) with the inverse of the lower triangular L (n, n), row by row from the rows above."""
+    inverse[:] = 0.0
+    for i in range(L.shape[0]):
+        diagonal = 1.0 / L[i, i]
+        row = inverse[i]
+        for k in range(i):
+            t = L[i, k] * diagonal
+            above = inverse[k]
+            for j in range(k + 1):
+                row[j] -= t * above[j]
+        row[i] = diagonal
+
+
 @njit(cache=True)
 def unpack(theta, evidence):
     """Return (s2, v) of theta."""
@@ -238,15 +253,9 @@ def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel,
         L[i, i] = s2 * (1.0 + ratio) + mean_variance + noise[i] + v
     if not cholesky(L):
         return -inf
-    inverse = np.zeros((n, n))  # row j holds L^-1 e_j, so inverse' is L^-1
-    for j in range(n):
-        inverse[j, j] = 1.0 / L[j, j]
-        for i in range(j + 1, n):
-            t = 0.0
-            for k in range(j, i):
-                t += L[i, k] * inverse[j, k]
-            inverse[j, i] = -t / L[i, i]
-    A_inverse = np.dot(inverse, inverse.T)
+    inverse = np.empty((n, n))
+    invert_lower(L, inverse)
+    A_inverse = np.dot(inverse.T, inverse)
     alpha = np.dot(A_inverse, y)
     value = -0.5 * n * _LOG_2PI
     for i in range(n):
