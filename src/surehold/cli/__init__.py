@@ -24,9 +24,11 @@ def run(arguments: list[str]) -> int:
 
     try:
         code = typer.main.get_command(application())(args=arguments, prog_name="surehold", standalone_mode=False)
+        if code == 130:  # what typer makes of Ctrl-C
+            return _interrupted()
         return code if isinstance(code, int) else 0
-    except typer.Exit as end:  # what typer makes of Ctrl-C, too
-        return _interrupted() if end.exit_code == 130 else end.exit_code
+    except typer.Exit as end:
+        return end.exit_code
     except exceptions.TyperException as error:
         format_message = getattr(error, "format_message", None)
         _say(f"{format_message() if format_message else error} See surehold --help.")

@@ -21,7 +21,7 @@ def announced(console: Console) -> Iterator[None]:
         def on_start(self, event: Any) -> None:
             if self.started is None:
                 self.started = time.perf_counter()
-                console.print("Compiling numerical kernels, once for this installation (under half a minute) ...")
+                console.print("Compiling numerical kernels, once for this installation (half a minute) ...")
 
         def on_end(self, event: Any) -> None: ...
 

@@ -1,5 +1,7 @@
 """`surehold grasp OBJECT`: find a grasp that still holds when the hand is off."""
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -52,7 +54,7 @@ def grasp(
             candidate,
             status=outcome.status,
             pose=f"palm at ({position}) mm, quaternion ({turn}), s1 = {outcome.s1:.2f} rad",
-            details={"contacts": str(len(outcome.contacts)), "touching": ", ".join(outcome.touching) or "nothing"},
+            details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)},
             scene=gather.grasp_scene(problem.simulator.scene(outcome)),
         )
 
@@ -87,6 +89,12 @@ def grasp(
         disturbance="the hand is off",
         console=console,
     )
+
+
+def touching_links(names: Sequence[str]) -> str:
+    """Return how many links of each finger touch, from names such as "index distal" and "palm"."""
+    counts = Counter(name.partition(" ")[0] for name in names)
+    return ", ".join(f"{finger} {n}" if finger != "palm" else finger for finger, n in counts.items()) or "none"
 
 
 def write_grasps(problem: Any, report: Any, path: Path) -> None:

@@ -86,7 +86,7 @@ def run_session(
     started = time.perf_counter()
     with announced(console):
         warm_up(problem, options)
-        result = _with_progress(problem, trials, options, console)
+    result = _with_progress(problem, trials, options, console)
     if result.interrupted:
         console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
     notes = _failures(result)

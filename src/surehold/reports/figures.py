@@ -170,6 +170,7 @@ def svg_text(figure: "Figure", name: str) -> str:
     with _style(name):
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
+        figure.set_layout_engine("none")  # the layout is found; a second search, for the PNG, would take as long again
     return buffer.getvalue()
 
 
