@@ -10,6 +10,7 @@ import yaml
 
 from surehold.errors import InputError
 from surehold.grasping.formats import StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
+from surehold.grasping.wrench_space import wrench_quality
 
 HEADER = "format: isaac_grasp\nformat_version: 1.0\nobject_frame: mug\ngripper_frame: hand\n"
 # layout of the published specification; Isaac Sim appends _link to the names of the frames
@@ -155,3 +156,12 @@ def test_records_become_plain_json():
     }
     with pytest.raises(InputError, match="no form in JSON"):
         grasp_to_dict({"f": object()})
+
+
+def test_a_quality_is_stored_without_its_wrenches():
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+    quality = wrench_quality(corners, -corners)
+    data = json.loads(json.dumps(grasp_to_dict(quality), allow_nan=False))
+    assert data["epsilon"] == quality.epsilon
+    assert data["weakest"] == quality.weakest.tolist()
+    assert "wrenches" not in data

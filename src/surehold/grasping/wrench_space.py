@@ -69,7 +69,7 @@ class WrenchQuality:
     """Unit wrench direction in which the grasp resists least, (6,)."""
     fallbacks: int
     """0: as planned; 1: rounding spoiled the expansion, a coarser tolerance was used; 2: the full hull by Qhull was."""
-    wrenches: NDArray[np.float64] = field(repr=False, compare=False)
+    wrenches: NDArray[np.float64] = field(repr=False, compare=False, metadata={"derived": True})
     """Wrenches of the cone edges, (m, 6)."""
 
     @cached_property
