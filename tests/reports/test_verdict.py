@@ -59,6 +59,12 @@ def test_a_difference_within_chance_is_said_to_be():
     assert "about the same" in told.headline
 
 
+def test_a_flat_run_found_nothing():
+    told = verdict(report(shaken("recommended", 0.0, 0.0 * SPREAD), y=np.array([0.0, 0.0, np.nan, 0.0])))
+    assert told.headline == "All 3 trials gave the same value, 0: nothing was found."
+    assert not told.refused
+
+
 def test_one_candidate_and_no_queries():
     alone = verdict(report(shaken("recommended", 3.0, 2.9 + 0.01 * SPREAD), disturbance="the hand is off"))
     assert "also the recommended one" in alone.headline

@@ -41,6 +41,7 @@ def doctor() -> None:
     compiled, total = compiled_kernels()
     table.add_row("compiled kernels", f"{compiled} of {total} are in the cache; others are compiled when first used")
     table.add_row("kernel cache", ", ".join(sorted({str(p) for p in kernel_folders()})) or "none")
+    table.add_row("data cache", data_cache())
     for name, found in graphics_libraries().items():
         table.add_row(name, found or "not found; only needed for still pictures by MuJoCo")
     Console(highlight=False).print(table)
@@ -63,6 +64,15 @@ def compiled_kernels() -> tuple[int, int]:
 def kernel_folders() -> set[Path]:
     """Return the folders that hold compiled kernels."""
     return {folder for _, folder in _kernels()}
+
+
+def data_cache() -> str:
+    """Return the folder of computed data, such as distance fields, and what it holds."""
+    from surehold.grasping.distance_field import cache_folder
+
+    folder = cache_folder()
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
+    return f"{folder}: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB"
 
 
 def graphics_libraries() -> dict[str, str | None]:

@@ -46,6 +46,14 @@ def verdict(report: RunReport) -> Verdict:
     """Return headline and paragraph for a run."""
     highest, answer = report.highest, report.recommended
     name, off = report.quality_name, report.disturbance
+    told = report.y[~report.failed]
+    if told.size > 1 and told.max() == told.min():
+        return Verdict(
+            f"All {told.size} trials gave the same {name}, {number(float(told[0]))}: nothing was found.",
+            "There is no better or worse to learn from yet, so the point shown is only the first. Run more trials, or "
+            "narrow the search to where outcomes differ.",
+            False,
+        )
     if highest.values.size == 0 or answer.values.size == 0:
         if highest.n_failed:
             why = f"All {highest.n_failed} re-queries with perturbed inputs failed, so the point does not hold at all."
