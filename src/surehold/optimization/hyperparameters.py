@@ -17,6 +17,7 @@ from surehold.optimization.slice_sampling import slice_sample
 __all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "mode"]
 
 _STARTS = (-2.0, -1.0, 0.0, 1.0)  # common length-scale of the mode's first guesses, in prior standard deviations
+_CURVATURE_STEP = 0.05
 _REACH = 6.0  # the mode is sought within this many prior standard deviations
 
 
@@ -45,14 +46,15 @@ class Learning:
 
     `method` "slice" keeps `particles` states of a slice sampler after `burn_in` sweeps, one every `thin` sweeps;
     "map" keeps the mode alone. The chain starts at the mode, or, with `start` "previous" (thesis), at the last
-    particle of the step before, or at log theta = 1 where there is none.
+    particle of the step before, or at log theta = 1 where there is none. `width` is the sampler's first guess of a
+    slice's width; None takes three standard deviations of the density at the start, from its curvature there.
     """
 
     method: Literal["slice", "map"] = "slice"
     particles: int = 10
     burn_in: int = 5
     thin: int = 1
-    width: float = 2.0
+    width: float | None = None
     start: Literal["mode", "previous"] = "mode"
 
 
@@ -87,9 +89,23 @@ def learn(
         keep=learning.particles,
         burn_in=learning.burn_in,
         thin=learning.thin,
-        width=learning.width,
+        widths=_widths(evidence, start) if learning.width is None else learning.width,
     )
     return Learnt(samples.states, evaluations + samples.evaluations)
+
+
+def _widths(evidence: Evidence, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return three standard deviations (p,) of the density along each coordinate, from its curvature at theta (p,)."""
+    widths = np.empty_like(theta)
+    for i in range(theta.size):
+        step = np.zeros_like(theta)
+        step[i] = _CURVATURE_STEP
+        rise = log_posterior_and_gradient(theta + step, evidence)[1][i]
+        fall = log_posterior_and_gradient(theta - step, evidence)[1][i]
+        curvature = (fall - rise) / (2.0 * _CURVATURE_STEP)
+        narrowest = 1.0 / evidence.prior_deviation[i] ** 2  # no density is wider than its prior
+        widths[i] = 3.0 / np.sqrt(max(curvature, narrowest))
+    return widths
 
 
 def from_prior(evidence: Evidence, particles: int, rng: np.random.Generator) -> Learnt:

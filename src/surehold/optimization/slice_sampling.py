@@ -3,7 +3,7 @@
 Legend
     theta    state (p,)
     level    log height of the slice under the density at theta
-    width    first guess of the slice's width, in theta's units
+    widths   first guess of the slice's width along each coordinate, in theta's units, (p,)
 The interval is stepped out without limit and shrunk on rejection: Neal 2003, figures 3 and 5.
 """
 
@@ -66,7 +66,7 @@ def _update(density, evidence, theta, i, value, width, rng):
 
 
 @njit(cache=True)
-def _sample(density, evidence, theta, width, burn_in, thin, states, log_densities, rng):
+def _sample(density, evidence, theta, widths, burn_in, thin, states, log_densities, rng):
     p = theta.size
     order = np.arange(p)
     value = density(theta, evidence)
@@ -76,7 +76,7 @@ def _sample(density, evidence, theta, width, burn_in, thin, states, log_densitie
             j = int(rng.random() * (i + 1))
             order[i], order[j] = order[j], order[i]
         for i in order:
-            value, cost = _update(density, evidence, theta, i, value, width, rng)
+            value, cost = _update(density, evidence, theta, i, value, widths[i], rng)
             evaluations += cost
         kept = sweep - burn_in + 1
         if kept > 0 and kept % thin == 0:
@@ -92,9 +92,7 @@ def _compiled() -> Any:
     density = types.FunctionType(types.float64(types.float64[::1], EVIDENCE_TYPE))
     generator = typeof(np.random.default_rng(0))
     vector, count = types.float64[::1], types.int64
-    _sample.compile(
-        (density, EVIDENCE_TYPE, vector, types.float64, count, count, types.float64[:, ::1], vector, generator)
-    )
+    _sample.compile((density, EVIDENCE_TYPE, vector, vector, count, count, types.float64[:, ::1], vector, generator))
     _sample.disable_compile()
     return _sample
 
@@ -108,7 +106,7 @@ def slice_sample(
     keep: int,
     burn_in: int,
     thin: int = 1,
-    width: float = 6.0,
+    widths: float | NDArray[np.float64] = 6.0,
 ) -> SliceSamples:
     """Draw `keep` states from exp(density), after `burn_in` sweeps, one every `thin` sweeps.
 
@@ -119,11 +117,12 @@ def slice_sample(
         coordinate once.
     start : (p,)
         First state; its density must be finite.
-    width
-        First guess of a slice's width in theta's units (6 in the thesis, in log space).
+    widths
+        First guess of a slice's width in theta's units, one number or one a coordinate (6 in the thesis, in log space).
     """
     states = np.empty((keep, start.size))
     log_densities = np.empty(keep)
     theta = np.array(start, dtype=np.float64)
-    evaluations = _compiled()(density, evidence, theta, float(width), burn_in, thin, states, log_densities, rng)
+    guesses = np.broadcast_to(np.asarray(widths, dtype=np.float64), theta.shape).copy()
+    evaluations = _compiled()(density, evidence, theta, guesses, burn_in, thin, states, log_densities, rng)
     return SliceSamples(states, log_densities, int(evaluations))
