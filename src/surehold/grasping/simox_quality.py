@@ -14,7 +14,6 @@ mesh is triangulated, by several percent for coarse meshes.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -107,21 +106,17 @@ def _hull_vertices(wrenches: NDArray[np.float64]) -> NDArray[np.intp]:
     lie in the plane perpendicular to the force, and the extreme ones among them are corners of a planar convex hull.
     """
     forces = np.round(wrenches[:, :3], 9) + 0.0  # no negative zeros
-    _, group = np.unique(forces, axis=0, return_inverse=True)
-    order = np.argsort(group.reshape(-1), kind="stable")
-    borders = np.flatnonzero(np.diff(group.reshape(-1)[order])) + 1
-    vertices = []
-    for first, end in pairwise([0, *borders.tolist(), len(order)]):
-        members = order[first:end]
-        if len(members) == 1:
-            vertices.append(members)
-            continue
+    _, group, counts = np.unique(forces, axis=0, return_inverse=True, return_counts=True)
+    group = group.reshape(-1)
+    vertices = [np.flatnonzero(counts[group] == 1)]
+    for shared in np.flatnonzero(counts > 1):
+        members = np.flatnonzero(group == shared)
         f = wrenches[members[0], :3]
         across = np.eye(3)[np.argmin(np.abs(f))]
         across = across - (across @ f) * f
         plane = np.column_stack((across, np.cross(f, across))).astype(np.float64)
         vertices.append(members[_planar_hull(wrenches[members, 3:] @ plane)])
-    return np.concatenate(vertices) if vertices else np.zeros(0, np.intp)
+    return np.concatenate(vertices)
 
 
 def _planar_hull(points: NDArray[np.float64]) -> list[int]:
