@@ -183,3 +183,15 @@ def test_the_module_is_the_command(here):
     assert done.returncode == 2
     assert done.stderr.startswith("error: problem 'nothing' is unknown")
     assert done.stdout == ""
+
+
+def test_a_closed_pipe_does_not_end_the_run(here):
+    line = [sys.executable, "-m", "surehold", "maximize", "gf", "--trials", "22", "--out", "piped"]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 0
+    assert (here / "piped" / "report.html").is_file()

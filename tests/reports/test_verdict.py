@@ -69,6 +69,9 @@ def test_one_candidate_and_no_queries():
     alone = verdict(report(shaken("recommended", 3.0, 2.9 + 0.01 * SPREAD), disturbance="the hand is off"))
     assert "also the recommended one" in alone.headline
     assert "when the hand is off" in alone.headline
+    assert "does not ask what happens when the hand is off" in alone.text
+    knowing = verdict(report(shaken("recommended", 3.0, 2.9 + 0.01 * SPREAD), robust_trace=np.ones(4)))
+    assert "expects no other trial to hold better" in knowing.text
     quiet = verdict(report(shaken("recommended", 3.0, [])))
     assert "No re-queries" in quiet.text
     assert "dx = 3.10 mm, rx = 28.6°, s = 0.250" in quiet.text

@@ -35,12 +35,13 @@ def grasp(
     input_noise = noise_of(noise or "none", method)
 
     from surehold.cli.compilation import announced
-    from surehold.cli.session import Console, folder_for, run_session
+    from surehold.cli.session import folder_for, run_session
+    from surehold.cli.terminal import terminal
     from surehold.problems.grasp import Grasp
     from surehold.reports import gather
     from surehold.reports.run_report import Candidate, RunReport
 
-    console = Console(highlight=False)
+    console = terminal()
     names = tuple(name.strip() for name in variables.split(",") if name.strip())
     with announced(console):
         problem = Grasp(obj, facet, names, contact=contact, quality=quality)

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from surehold.cli.compilation import announced, warm_up
+from surehold.cli.terminal import terminal
 from surehold.errors import InputError
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.maximization import Result, Trial, maximize
@@ -66,7 +67,7 @@ def run_session(
     KeyboardInterrupt
         If Ctrl-C comes before any trial has given a value.
     """
-    console = console or Console(highlight=False)
+    console = console or terminal()
     for name, count in (("trials", trials), ("initial", initial)):
         if count < 1:
             raise InputError(f"--{name} is {count}; give 1 or more.")

@@ -67,10 +67,14 @@ def verdict(report: RunReport) -> Verdict:
             False,
         )
     if len(report.candidates) == 1:
+        if report.robust_trace is None:
+            why = f"The method looks for the highest value and does not ask what happens when {off}."
+        else:
+            why = "The model expects no other trial to hold better."
         return Verdict(
             f"The highest trial is also the recommended one: {number(answer.quality)} when hit exactly, "
             f"{number(answer.mean)} on average when {off}.",
-            f"{_sentence(answer, 'The recommended point', name)} The model expects no other trial to hold better.",
+            f"{_sentence(answer, 'The recommended point', name)} {why}",
             False,
         )
     gap, error = _difference(highest, answer)
