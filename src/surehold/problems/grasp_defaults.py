@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from surehold.grasping.grasp import Simulator
 from surehold.grasping.meshes import OBJECTS
-from surehold.grasping.poses import MODES, default_pose, facet_axes
+from surehold.grasping.poses import MODES, Pose, default_pose, facet_axes
+from surehold.grasping.synergy import power_grasp
 
 __all__ = ["GraspDefault", "grasp_default", "search_default"]
 
@@ -32,30 +33,30 @@ _POSTURES: Final = (-1.2, -0.95, -0.7, -0.45, -0.2, 0.1)
 
 #: (object, mode) -> standoff [mm], s1 [rad]; printed by this module
 _TABLE: Final[dict[tuple[str, str], tuple[float, float]]] = {
-    ("mug", "right-front"): (21.1, -0.70),
-    ("mug", "right-back"): (21.1, -0.70),
-    ("mug", "right-top"): (28.9, -0.20),
-    ("mug", "right-bottom"): (28.9, -0.45),
+    ("mug", "right-front"): (18.5, -0.95),
+    ("mug", "right-back"): (23.7, -0.95),
+    ("mug", "right-top"): (23.7, -0.20),
+    ("mug", "right-bottom"): (23.7, -0.70),
     ("mug", "front-right"): (39.2, -0.95),
     ("mug", "front-left"): (39.2, -0.95),
-    ("mug", "front-top"): (49.0, -1.20),
-    ("mug", "front-bottom"): (49.0, -1.20),
-    ("mug", "left-front"): (21.1, -0.70),
-    ("mug", "left-back"): (21.1, -0.70),
-    ("mug", "left-top"): (28.9, -0.45),
-    ("mug", "left-bottom"): (28.9, -0.20),
-    ("mug", "back-right"): (49.0, -1.20),
-    ("mug", "back-left"): (49.0, -1.20),
-    ("mug", "back-top"): (39.2, -0.95),
+    ("mug", "front-top"): (52.3, -1.20),
+    ("mug", "front-bottom"): (52.3, -1.20),
+    ("mug", "left-front"): (18.5, -0.95),
+    ("mug", "left-back"): (23.7, -0.95),
+    ("mug", "left-top"): (23.7, -1.20),
+    ("mug", "left-bottom"): (23.7, -0.20),
+    ("mug", "back-right"): (45.7, -0.20),
+    ("mug", "back-left"): (52.3, -1.20),
+    ("mug", "back-top"): (39.2, -1.20),
     ("mug", "back-bottom"): (39.2, -1.20),
     ("mug", "top-right"): (33.1, -0.20),
-    ("mug", "top-front"): (33.1, -0.45),
+    ("mug", "top-front"): (44.5, -0.70),
     ("mug", "top-left"): (33.1, -0.70),
-    ("mug", "top-back"): (33.1, -0.70),
+    ("mug", "top-back"): (27.3, -0.95),
     ("mug", "bottom-right"): (33.1, 0.10),
-    ("mug", "bottom-front"): (50.3, -1.20),
-    ("mug", "bottom-left"): (33.1, -1.20),
-    ("mug", "bottom-back"): (50.3, -1.20),
+    ("mug", "bottom-front"): (44.5, -1.20),
+    ("mug", "bottom-left"): (44.5, -1.20),
+    ("mug", "bottom-back"): (38.8, 0.10),
 }
 
 
@@ -70,22 +71,22 @@ def grasp_default(simulator: Simulator, mode: str) -> GraspDefault:
 def search_default(simulator: Simulator, mode: str) -> GraspDefault:
     """Search standoff and s1 of a mode as the module says."""
     along, across, depth = np.abs(facet_axes(mode).T) @ simulator.object.box_half_extents
-    best, best_score = GraspDefault(depth, 0.0), (-np.inf, -np.inf)
-    for standoff in np.round(np.linspace(depth / 3.0, depth + 0.020, 10), 4):
+    offsets = [(dx, dy) for dx in (along + 0.025) * _middles(15) for dy in across * _middles(7)]
+    candidates: list[tuple[float, GraspDefault, list[Pose]]] = []
+    for standoff in np.round(np.linspace(depth / 3.0, depth + 0.020, 10), 4).tolist():
+        poses = [
+            default_pose(simulator.hand, simulator.object, mode, standoff, (*offset, 0, 0, 0, 0)) for offset in offsets
+        ]
         for s1 in _POSTURES:
-            qualities, free = [], 0
-            for dx in (along + 0.025) * _middles(15):
-                for dy in across * _middles(7):
-                    pose = default_pose(simulator.hand, simulator.object, mode, float(standoff), (dx, dy, 0, 0, 0, 0))
-                    outcome = simulator.grasp(pose, s1)
-                    free += outcome.status != "initial collision"
-                    qualities.append(outcome.quality)
-            share = free / len(qualities)
+            opened = power_grasp(simulator.hand, s1).joints(0.0)
+            free = [pose for pose in poses if simulator.gaps(pose, opened).min() >= 0.0]
+            share = len(free) / len(poses)
             outside = max(_FREE_SHARE[0] - share, share - _FREE_SHARE[1], 0.0)
-            score = (-outside, float(np.mean(qualities)))
-            if score > best_score:
-                best, best_score = GraspDefault(float(standoff), s1), score
-    return best
+            candidates.append((outside, GraspDefault(standoff, s1), free))
+    nearest = min(outside for outside, _, _ in candidates)
+    eligible = [(default, free) for outside, default, free in candidates if outside == nearest]
+    totals = [sum(simulator.grasp(pose, default.s1).quality for pose in free) for default, free in eligible]
+    return eligible[int(np.argmax(totals))][0]
 
 
 def _middles(n: int) -> NDArray[np.float64]:
