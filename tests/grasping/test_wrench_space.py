@@ -354,3 +354,16 @@ def test_volume_of_a_thin_hull():
 def test_too_many_wrenches_are_refused():
     with pytest.raises(InputError, match="65535 can be measured"):
         inscribed_ball(np.random.default_rng(16).normal(size=(65_536, 6)))
+
+
+def test_any_layout_of_the_wrenches_is_the_same_and_compiles_once():
+    from surehold.grasping.nearest_facet import expand_nearest
+
+    w = contact_wrenches(*random_contacts(np.random.default_rng(17), 6))
+    epsilon = ball_radius(w)
+    compiled = len(expand_nearest.signatures)
+    frozen = w.copy()
+    frozen.flags.writeable = False
+    for other in (np.asfortranarray(w), np.repeat(w, 2, axis=0)[::2], frozen):
+        assert ball_radius(other) == epsilon
+    assert len(expand_nearest.signatures) == compiled

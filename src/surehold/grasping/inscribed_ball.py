@@ -64,7 +64,7 @@ class InscribedBall(NamedTuple):
 
 
 def ball_radius(wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None) -> float:
-    """Return epsilon of wrenches (m, 6), C-contiguous and finite; the fast path, nothing else is computed.
+    """Return epsilon of wrenches (m, 6), which must be finite; the fast path, nothing else is computed or checked.
 
     With round contacts, their cone edges (any number of edges, 4 will do) must be among the wrenches.
     """
@@ -80,7 +80,7 @@ def inscribed_ball(wrenches: ArrayLike, round_contacts: RoundContacts | None = N
     Round contacts as in `ball_radius`. Raises InputError if the wrenches are not finite, not of shape (m, 6), or
     more than 65,535.
     """
-    w = np.ascontiguousarray(finite_array("wrenches", wrenches, (None, 6)))
+    w = finite_array("wrenches", wrenches, (None, 6))
     status, lower, upper, normal, expansions, facets, fallbacks = _expand(w, round_contacts)
     if status == FAILED:
         lower, normal = _ball_from_hull(w)
@@ -168,7 +168,8 @@ def _expand(
         return FLAT, 0.0, 0.0, flat, 0, 0, 0
     if len(w) > MAX_WRENCHES:
         raise InputError(f"{len(w)} wrenches are too many, {MAX_WRENCHES} can be measured; merge contacts.")
-    centers, axes = round_contacts or _NO_ROUND
+    w = np.array(w, np.float64, order="C")  # other layouts and read-only arrays would be compiled for anew
+    centers, axes = (np.array(a, np.float64, order="C") for a in round_contacts or _NO_ROUND)
     gap = ROUND_GAP if len(centers) else 0.0
     budgets = ROUND_FACET_BUDGETS if len(centers) else FACET_BUDGETS
     for fallbacks, tolerance in enumerate(TOLERANCES):
