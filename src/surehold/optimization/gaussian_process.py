@@ -33,6 +33,7 @@ from surehold.optimization.likelihood import (
 )
 from surehold.optimization.outputs import Standardization, checked_range
 from surehold.optimization.surrogate import FitDiagnostics, Moments, Posterior, mixture
+from surehold.optimization.threads import single_threaded
 
 __all__ = ["GaussianProcess", "GaussianProcessPosterior"]
 
@@ -63,6 +64,35 @@ def _factorize(X, Y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, inve
     return repaired
 
 
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _weighted_sums(C, weights, out):
+    """Fill out (n, q) with the sums over s of weights (s,) times the columns of C (n, q s)."""
+    s = weights.size
+    for a in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            t = 0.0
+            for w in range(s):
+                t += weights[w] * C[a, i * s + w]
+            out[a, i] = t
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _weighted_slopes(F, X, Z, slopes, weights, k, out):
+    """Fill out (n, q) with the sums over s of -weights g (z_k - x_k) slope, for radial factors F (n, q s).
+
+    Z (d, q s) are the perturbed points, slopes (d, q s) their derivatives by the query.
+    """
+    s = weights.size
+    for a in range(out.shape[0]):
+        x = X[a, k]
+        for i in range(out.shape[1]):
+            t = 0.0
+            for w in range(s):
+                c = i * s + w
+                t -= weights[w] * F[a, c] * (Z[k, c] - x) * slopes[k, c]
+            out[a, i] = t
+
+
 @njit(cache=True)
 def _average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha, gradient):
     """Return mean, variance (m, q) and their gradients (m, q, d) of the weighted sums at Q (q, d).
@@ -72,75 +102,65 @@ def _average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kerne
     """
     m, n = alpha.shape
     q, d = Q.shape
-    mean = np.empty((m, q))
+    s = weights.size
+    last = offsets.shape[0] - 1
+    points = np.empty((q * s, d))
+    slope = np.ones((d, q * s if gradient else 0))
+    for i in range(q):
+        for w in range(s):
+            for k in range(d):
+                points[i * s + w, k] = Q[i, k] + offsets[min(i, last), w, k]
+                if gradient:
+                    slope[k, i * s + w] = slopes[min(i, last), w, k]
+    Z = np.ascontiguousarray(points.T)
+    mean = np.zeros((m, q))
     variance = np.empty((m, q))
     mean_gradient = np.zeros((m, q if gradient else 0, d))
     variance_gradient = np.zeros((m, q if gradient else 0, d))
-    total = weights.sum()
-    part = np.empty((n, q))
-    factor = np.empty((n, q if gradient else 0))
-    s = weights.size
+    C = np.empty((n, q * s))
+    F = np.empty((n, q * s if gradient else 0))
+    K = np.empty((n, q))
+    D = np.empty((n, q if gradient else 0))
     own = np.empty((s, s))
     own_factor = np.empty((s, s))
-    prior = np.empty(offsets.shape[0])
-    prior_gradient = np.zeros((offsets.shape[0], d))
-    last = offsets.shape[0] - 1
-    shifted = np.empty((q, d))
-    slope = np.zeros((d, n, q if gradient else 0))
+    shift = mean_variance * weights.sum()
     for j in range(m):
-        K = np.zeros((n, q))
-        slope[:] = 0.0
-        for w in range(s):
-            for i in range(q):
-                for k in range(d):
-                    shifted[i, k] = Q[i, k] + offsets[min(i, last), w, k]
-            if gradient:
-                correlation_and_factor(kernel, X, shifted, inverse_l[j], part, factor)
-                for k in range(d):
-                    scale = -s2[j] * weights[w] * inverse_l[j, k] ** 2
-                    for a in range(n):
-                        for i in range(q):
-                            t = shifted[i, k] - X[a, k]
-                            slope[k, a, i] += scale * factor[a, i] * t * slopes[min(i, last), w, k]
-            else:
-                cross_correlation(kernel, X, shifted, inverse_l[j], part)
-            scale = s2[j] * weights[w]
-            for a in range(n):
-                for i in range(q):
-                    K[a, i] += scale * part[a, i]
-        if mean_variance > 0.0:
-            K += mean_variance * total
         for b in range(offsets.shape[0]):
             xi = offsets[b]
             correlation_and_factor(kernel, xi, xi, inverse_l[j], own, own_factor)
-            prior[b] = 0.0
-            prior_gradient[b] = 0.0
+            prior = 0.0
             for w in range(s):
                 for o in range(s):
-                    both = weights[w] * weights[o]
-                    prior[b] += both * (s2[j] * own[w, o] + mean_variance)
-                    if gradient:
-                        for k in range(d):
-                            t = (xi[w, k] - xi[o, k]) * (slopes[b, w, k] - slopes[b, o, k])
-                            prior_gradient[b, k] -= both * s2[j] * own_factor[w, o] * t * inverse_l[j, k] ** 2
+                    prior += weights[w] * weights[o] * (s2[j] * own[w, o] + mean_variance)
+            variance[j, b:] = prior
+            if gradient:
+                for k in range(d):
+                    t = 0.0
+                    for w in range(s):
+                        for o in range(s):
+                            step = (xi[w, k] - xi[o, k]) * (slopes[b, w, k] - slopes[b, o, k])
+                            t -= weights[w] * weights[o] * own_factor[w, o] * step
+                    variance_gradient[j, b:, k] = s2[j] * t * inverse_l[j, k] ** 2
+        if gradient:
+            correlation_and_factor(kernel, X, points, inverse_l[j], C, F)
+        else:
+            cross_correlation(kernel, X, points, inverse_l[j], C)
+        _weighted_sums(C, s2[j] * weights, K)
+        if shift != 0.0:
+            K += shift
         V = np.dot(inverse_L[j], K)
-        for i in range(q):
-            mean[j, i] = 0.0
-            variance[j, i] = prior[min(i, last)]
         for a in range(n):
             for i in range(q):
                 mean[j, i] += alpha[j, a] * K[a, i]
                 variance[j, i] -= V[a, i] * V[a, i]
         if gradient:
             W = np.dot(inverse_L[j].T, V)
-            for i in range(q):
-                for k in range(d):
-                    variance_gradient[j, i, k] = prior_gradient[min(i, last), k]
             for k in range(d):
+                _weighted_slopes(F, X, Z, slope, s2[j] * inverse_l[j, k] ** 2 * weights, k, D)
                 for a in range(n):
                     for i in range(q):
-                        mean_gradient[j, i, k] += alpha[j, a] * slope[k, a, i]
-                        variance_gradient[j, i, k] -= 2.0 * W[a, i] * slope[k, a, i]
+                        mean_gradient[j, i, k] += alpha[j, a] * D[a, i]
+                        variance_gradient[j, i, k] -= 2.0 * W[a, i] * D[a, i]
     return mean, np.maximum(variance, 0.0), mean_gradient, variance_gradient
 
 
@@ -449,7 +469,8 @@ class GaussianProcess:
             If shapes do not fit or a value is not finite.
         """
         inputs, outputs = checked_data(X, y)
-        self._posterior = self.condition(inputs, outputs, np.random.default_rng(seed))
+        with single_threaded():
+            self._posterior = self.condition(inputs, outputs, np.random.default_rng(seed))
         return self
 
     @property
@@ -462,7 +483,8 @@ class GaussianProcess:
     def predict(self, X: ArrayLike, return_std: bool = False):
         """Return the mean (q,) at X (q, d), and the standard deviation (q,) of the latent function where asked for."""
         queries, _ = checked_data(X, None, self.posterior.evidence.X.shape[1])
-        mean, variance = mixture(self.posterior.moments(queries))
+        with single_threaded():
+            mean, variance = mixture(self.posterior.moments(queries))
         return (mean, np.sqrt(variance)) if return_std else mean
 
 
