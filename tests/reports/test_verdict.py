@@ -59,6 +59,19 @@ def test_a_difference_within_chance_is_said_to_be():
     assert "about the same" in told.headline
 
 
+def test_equal_means_but_one_often_fails():
+    often_nothing = np.where(np.arange(50) % 4 == 0, 0.0, 2.6)
+    told = verdict(
+        report(shaken("highest observed", 3.0, often_nothing), shaken("recommended", 2.0, 2.0 + 0.05 * SPREAD))
+    )
+    assert told.refused
+    assert "in 13 of 50 cases, the recommended point in none" in told.headline
+    turned = verdict(
+        report(shaken("highest observed", 3.0, 2.0 + 0.05 * SPREAD), shaken("recommended", 2.9, often_nothing))
+    )
+    assert not turned.refused
+
+
 def test_a_flat_run_found_nothing():
     told = verdict(report(shaken("recommended", 0.0, 0.0 * SPREAD), y=np.array([0.0, 0.0, np.nan, 0.0])))
     assert told.headline == "All 3 trials gave the same value, 0: nothing was found."

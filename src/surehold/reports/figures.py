@@ -103,7 +103,7 @@ def surface_names(report: RunReport, index: int) -> dict[bool, str]:
 def shake(report: RunReport, candidate: Candidate) -> "Figure":
     """Return the histogram of a candidate's re-queries, on the axes that all candidates share."""
     with _style("shake"):
-        figure, axes = _figure(4.9, 1.75)
+        figure, axes = _figure(4.5, 1.7)
         _draw_shake(axes, report, candidate)
     return figure
 
@@ -111,7 +111,7 @@ def shake(report: RunReport, candidate: Candidate) -> "Figure":
 def surface(report: RunReport, view: Surface, robust: bool) -> "Figure":
     """Return the model over one or two variables with the trials on it; `robust`: averaged over the input noise."""
     with _style("surface"):
-        figure, axes = _figure(4.9, 4.1) if len(view.variables) == 2 else _figure(6.0, 3.4)
+        figure, axes = _figure(4.5, 3.9) if len(view.variables) == 2 else _figure(5.6, 3.3)
         if len(view.variables) == 2:
             _draw_map(axes, report, view, robust)
         else:
@@ -122,7 +122,7 @@ def surface(report: RunReport, view: Surface, robust: bool) -> "Figure":
 def trace(report: RunReport) -> "Figure":
     """Return best and robust value by trial, over the values of the single trials."""
     with _style("trace"):
-        figure, axes = _figure(5.6, 3.1)
+        figure, axes = _figure(5.2, 3.0)
         _draw_trace(axes, report)
     return figure
 

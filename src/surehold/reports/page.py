@@ -10,7 +10,7 @@ import numpy as np
 from surehold.reports import figures
 from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.scene import scene_data
-from surehold.reports.verdict import change, coordinates, number, verdict
+from surehold.reports.verdict import change, coordinates, halved, number, verdict
 
 __all__ = ["render", "table_rows"]
 
@@ -118,7 +118,7 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         "worst": number(candidate.worst),
         "std": number(candidate.std, 2),
         "n": candidate.values.size,
-        "halved": int(np.sum(candidate.values < 0.5 * candidate.quality)) if candidate.quality > 0.0 else 0,
+        "halved": halved(candidate),
         "change": change(candidate) if shaken else "",
         "svg": svg,
     }

@@ -7,7 +7,7 @@ import numpy as np
 
 from surehold.reports.run_report import Candidate, RunReport
 
-__all__ = ["Verdict", "change", "coordinates", "number", "verdict"]
+__all__ = ["Verdict", "change", "coordinates", "halved", "number", "verdict"]
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,13 @@ def verdict(report: RunReport) -> Verdict:
         f"{_sentence(highest, 'The highest point', name)} {_sentence(answer, 'The recommended point', name)} "
         f"The means differ by {number(gap)} (standard error {number(error, 2)}, both points shaken alike)."
     )
+    lost, kept = halved(highest), halved(answer)
+    if abs(gap) <= 2.0 * error and lost - kept > 2.0 * math.sqrt(lost + kept):
+        headline = (
+            f"The highest peak ({number(highest.quality)}) was refused: when {off} it loses more than half in "
+            f"{lost} of {highest.values.size} cases, the recommended point in {kept or 'none'}."
+        )
+        return Verdict(headline, text, True)
     if abs(gap) <= 2.0 * error:
         headline = (
             f"When {off}, the highest trial and the recommended one are worth about the same: "
@@ -109,12 +116,16 @@ def _sentence(candidate: Candidate, subject: str, name: str) -> str:
         f"Queried again {n} times with perturbed inputs it gave {number(candidate.mean)} on average "
         f"({_change(candidate)}), {number(candidate.worst)} at worst."
     )
-    half = int(np.sum(candidate.values < 0.5 * candidate.quality)) if candidate.quality > 0.0 else 0
-    if half:
-        text += f" In {half} of {n} it lost more than half."
+    if halved(candidate):
+        text += f" In {halved(candidate)} of {n} it lost more than half."
     if candidate.n_failed:
         text += f" {candidate.n_failed} further re-queries gave no value."
     return text
+
+
+def halved(candidate: Candidate) -> int:
+    """Return in how many re-queries the point lost more than half of its exact value; 0 where that says nothing."""
+    return int(np.sum(candidate.values < 0.5 * candidate.quality)) if candidate.quality > 0.0 else 0
 
 
 def change(candidate: Candidate) -> str:
