@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import erfcx, log_ndtr, ndtr
+from scipy.special import erfcx, ndtr
 
 __all__ = [
     "Value",
@@ -25,7 +25,8 @@ __all__ = [
 ]
 
 _LOG_SQRT_2PI: Final = 0.5 * log(2.0 * pi)
-_SMALLEST: Final = 1e-150  # a standard deviation below this is treated as this: keeps z finite
+_SMALLEST: Final = 1e-290  # a standard deviation below this is treated as this
+_FARTHEST: Final = 1e8  # |z| beyond this is treated as this: derivatives stay finite
 
 
 class Value(NamedTuple):
@@ -43,7 +44,7 @@ def expected_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, margi
     """
     mean, std = np.asarray(mean, dtype=np.float64), np.asarray(std, dtype=np.float64)
     gain = mean - np.asarray(best) - margin
-    z = gain / np.maximum(std, _SMALLEST)
+    z = gain / _floored(std, gain)
     density = _density(z)
     probability = ndtr(z)
     # For z below -1 the two terms nearly cancel; the scaled complementary error function does not.
@@ -57,29 +58,26 @@ def log_expected_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, m
 
     log EI = log std + log h(z), h(z) = phi(z) + z Phi(z), with the asymptotic branch of Ament et al. 2023.
     """
-    std = np.maximum(np.asarray(std, dtype=np.float64), _SMALLEST)
-    z = (np.asarray(mean, dtype=np.float64) - np.asarray(best) - margin) / std
-    # log h: below -1 the sum cancels; far below, 1 - |z| sqrt(pi/2) erfcx is rounding and its limit 1 / z^2 holds.
+    gain = np.asarray(mean, dtype=np.float64) - np.asarray(best) - margin
+    std = _floored(std, gain)
+    z = gain / std
+    # log h: below -1 the sum cancels; 1 - |z| Phi / phi by erfcx does not, nor does the ratio Phi / h = d log h / dz.
     low = z < -1.0
     z_low = np.where(low, z, -1.0)
     z_high = np.where(low, 0.0, z)
-    with np.errstate(over="ignore"):
-        log_density_low = -0.5 * z_low * z_low - _LOG_SQRT_2PI
-    log_h = np.where(
-        low,
-        log_density_low + np.log(_mills_gap(z_low)),
-        np.log(np.exp(-0.5 * z_high * z_high - _LOG_SQRT_2PI) + z_high * ndtr(z_high)),
-    )
-    ratio = np.exp(log_ndtr(z) - log_h)  # Phi / h = d log h / dz
-    ratio = np.where(z < -1e8, -z, ratio)
-    value = np.log(std) + log_h
-    return Value(value, ratio / std, (1.0 - z * ratio) / std)
+    gap = _mills_gap(z_low)
+    probability = ndtr(z_high)
+    h = np.exp(-0.5 * z_high * z_high - _LOG_SQRT_2PI) + z_high * probability
+    log_h = np.where(low, -0.5 * z_low * z_low - _LOG_SQRT_2PI + np.log(gap), np.log(h))
+    ratio = np.where(low, sqrt(0.5 * pi) * erfcx(-z_low / sqrt(2.0)) / gap, probability / h)
+    return Value(np.log(std) + log_h, ratio / std, (1.0 - z * ratio) / std)
 
 
 def probability_of_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, margin: float = 0.0) -> Value:
     """Return Phi(z), thesis table 2.1; 0 or 1 at std 0."""
-    std = np.maximum(np.asarray(std, dtype=np.float64), _SMALLEST)
-    z = (np.asarray(mean, dtype=np.float64) - np.asarray(best) - margin) / std
+    gain = np.asarray(mean, dtype=np.float64) - np.asarray(best) - margin
+    std = _floored(std, gain)
+    z = gain / std
     density = _density(z)
     return Value(ndtr(z), density / std, -z * density / std)
 
@@ -90,16 +88,18 @@ def upper_confidence_bound(mean: ArrayLike, std: ArrayLike, kappa: float) -> Val
     return Value(mean + kappa * std, np.ones_like(mean), np.full_like(std, kappa))
 
 
+def _floored(std: ArrayLike, gain: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return standard deviations that keep z = gain / std and its square finite."""
+    return np.maximum(np.maximum(np.asarray(std, dtype=np.float64), _SMALLEST), np.abs(gain) / _FARTHEST)
+
+
 def _density(z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the standard normal density, 0 far out without overflow on the way."""
-    bounded = np.clip(z, -40.0, 40.0)
-    return np.exp(-0.5 * bounded * bounded - _LOG_SQRT_2PI)
+    return np.exp(-0.5 * z * z - _LOG_SQRT_2PI)
 
 
 def _mills_gap(z: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return 1 - |z| Phi(z) / phi(z) for z <= -1 without cancellation; about 1 / z^2 far out."""
-    with np.errstate(over="ignore"):
-        far = 1.0 / (z * z)
+    far = 1.0 / (z * z)
     near = 1.0 + z * sqrt(0.5 * pi) * erfcx(-z / sqrt(2.0))
     series = far * (1.0 - 3.0 * far * (1.0 - 5.0 * far * (1.0 - 7.0 * far)))
     return np.where(z < -200.0, series, near)
