@@ -54,7 +54,7 @@ def test_the_page_says_what_happened(gm_report, gm_page):
     assert f"{gm_report.highest.mean:.4f}" in words
     assert f"{gm_report.recommended.mean:.4f}" in words
     assert "seed 1" in words
-    assert "unscented mean" in words
+    assert "Unscented mean" in words
     assert words.count("initial") >= 8
 
 

@@ -291,7 +291,7 @@ def _draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> N
     for candidate in report.candidates:
         _draw_candidate(axes, report, candidate, (i, j))
     axes.set(xlabel=first.label, ylabel=second.label, xlim=extent[:2], ylim=extent[2:])
-    axes.set_title("Averaged over the input noise (unscented mean)" if robust else "Model of the exact outcome (mean)")
+    axes.set_title("Unscented mean (over the input noise)" if robust else "Model mean (input hit exactly)")
     bar = axes.figure.colorbar(image, ax=axes, fraction=0.05, pad=0.02, aspect=25)
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     bar.set_label(report.quality_name)

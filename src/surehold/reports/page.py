@@ -98,7 +98,7 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
     shaken = candidate.values.size > 0
     tag = ""
     if refused and shaken:
-        tag = "refused" if label["role"] == "high" else "holds"
+        tag = "refused" if label["role"] == "high" else "holds better"
     svg = None
     if shaken:
         name = f"shake-{label['role']}"
