@@ -122,9 +122,9 @@ def contact_wrenches(
 ) -> NDArray[np.float64]:
     """Return the wrenches of the edges of all friction cones, (m, 6), contact by contact.
 
-    Arguments and errors as in `wrench_quality`. A contact has `edges` wrenches, and with torsional friction
-    anywhere two more:
-    the normal force with the largest moment about the normal either way. Contacts of weight zero are left out.
+    Arguments and errors as in `wrench_quality`. A contact has `edges` wrenches, and with torsional friction anywhere
+    two more: the normal force with the largest moment about the normal either way. Contacts of weight zero are left
+    out.
     """
     contacts = CheckedContacts.checked(
         points, normals, friction, torque_length, origin, tangents, convention, weights, torsion
@@ -154,9 +154,9 @@ def cone_edges(contacts: CheckedContacts, edges: int) -> NDArray[np.float64]:
 def round_contacts(contacts: CheckedContacts) -> RoundContacts:
     """Return the ellipsoids of wrenches of checked contacts with round friction cones.
 
-    Coulomb friction is a disk; with torsional friction it is the friction ellipsoid (f_t / mu)^2 + (moment /
-    gamma)^2 <= f_n^2
-    (Howe and Cutkosky 1996). With "unit_magnitude" the forces of the cone's rim have magnitude one, in between less.
+    Coulomb friction is a disk; with torsional friction it is the friction ellipsoid (f_t / mu)^2 + (moment / gamma)^2
+    <= f_n^2 (Howe and Cutkosky 1996). With "unit_magnitude" the forces of the cone's rim have magnitude one, in
+    between less.
     """
     n, t, arms, mu, gamma, scale = contacts
     axes = np.zeros((len(n), 6, 3))

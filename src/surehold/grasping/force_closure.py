@@ -19,12 +19,10 @@ __all__ = ["force_closure", "gravity_wrenches", "task_quality"]
 def force_closure(wrenches: ArrayLike) -> bool:
     """Return whether nonnegative combinations of wrenches (m, 6) reach every wrench.
 
-    They do if and only if the wrenches have rank six and some x > 0 has W' x = 0 (all entries positive). As x may
-    be scaled, x >= 1 can be asked
-    for: a linear program (HiGHS) that is feasible or not. Its answer is known to a tolerance only; it is then made
-    exact: the smallest correction y with W' (x + y) = 0 must leave all of x + y positive, which proves closure. A
-    "no" is
-    proved likewise where possible, by a direction u with W u <= 0, and is the answer if neither can be proved.
+    They do if and only if the wrenches have rank six and some x > 0 has W' x = 0 (all entries positive). As x may be
+    scaled, x >= 1 can be asked for: a linear program (HiGHS) that is feasible or not. A solution is known to a
+    tolerance only, and is then made exact: the smallest correction y with W' (x + y) = 0 must leave all of x + y
+    positive, which proves closure. The answer is no if the program is infeasible or the proof fails.
 
     Raises InputError if the wrenches are not finite or not of shape (m, 6).
     """
@@ -50,13 +48,11 @@ def task_quality(wrenches: ArrayLike, task: ArrayLike) -> float:
     """Return the largest scale at which the grasp still balances every one of the external wrenches, >= 0.
 
     Parameters: wrenches (m, 6), the contacts' unit wrenches; task (k, 6), k >= 1 external wrenches in the same
-    scaling (see
-    `gravity_wrenches`), each as large as it weighs. Contact forces are limited in sum (L1): W' x = -scale t with
-    x >= 0,
-    sum of x <= 1, one linear program (HiGHS) for each t. For a grasp in force closure this is the distance from the
-    origin to the hull's surface along -t, in units of t, the smallest over the task (Li and Sastry 1988). 0 means
-    that some wrench
-    cannot be balanced at all. A wrench of zero asks for nothing; infinity if all are.
+    scaling (see `gravity_wrenches`), each as large as it weighs. Contact forces are limited in sum (L1): W' x =
+    -scale t with x >= 0, sum of x <= 1, one linear program (HiGHS) for each t. For a grasp in force closure this is
+    the distance from the origin to the hull's surface along -t, in units of t, the smallest over the task (Li and
+    Sastry 1988). 0 means that some wrench cannot be balanced at all. A wrench of zero asks for nothing; infinity if
+    all are.
 
     Raises InputError if an array is not finite or not of shape (m, 6).
     """
@@ -98,10 +94,10 @@ def gravity_wrenches(
 ) -> NDArray[np.float64]:
     """Return the external wrenches of gravity, (k, 6), for `task_quality`.
 
-    Parameters: weight, mass times 9.81 divided by the force one contact may apply (then a quality of 1 means:
-    just held);
-    center_of_mass (3,) [m]; directions (k, 3) unit vectors in which gravity may point, default the six axis directions;
-    torque_length [m] and origin [m] as given to `contact_wrenches`. Raises InputError for unusable values.
+    Parameters: weight, mass times 9.81 divided by the normal force that all contacts together may apply (then a
+    quality of 1 means: just held); center_of_mass (3,) [m]; directions (k, 3) unit vectors in which gravity may point, default the six axis
+    directions; torque_length [m] and origin [m] as given to `contact_wrenches`. Raises InputError for unusable
+    values.
     """
     if not (isinstance(weight, (int, float)) and np.isfinite(weight) and weight > 0.0):
         raise InputError(f"weight must be finite and above 0, not {weight!r}.")

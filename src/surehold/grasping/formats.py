@@ -1,10 +1,9 @@
 """Grasps in files: the Isaac grasp format (YAML, `isaac_grasp` version 1.0), and plain dictionaries for JSON.
 
 An Isaac grasp file is a mapping of `format`, `format_version`, `object_frame`, `gripper_frame` (names for human
-readers) and
-`grasps`: name -> `confidence` in [0, 1], `position` of the gripper frame in the object frame [m], `orientation`
-`{w, xyz}`, `cspace_position` (joint -> value [rad or m] of the closed hand) and `pregrasp_cspace_position` (open hand).
-Files are data only: nothing in them is executed, fetched or expanded.
+readers) and `grasps`: name -> `confidence` in [0, 1], `position` of the gripper frame in the object frame [m],
+`orientation` `{w, xyz}`, `cspace_position` (joint -> value [rad or m] of the closed hand) and
+`pregrasp_cspace_position` (open hand). Files are data only: nothing in them is executed, fetched or expanded.
 """
 
 from collections.abc import Iterable, Mapping
@@ -57,9 +56,8 @@ class GraspFile:
 def write_isaac_grasps(path: str | Path, grasps: Iterable[StoredGrasp], object_frame: str, gripper_frame: str) -> None:
     """Write grasps as an Isaac grasp file, numbers in full precision.
 
-    Raises InputError if a grasp is not usable (name twice, not finite, quaternion not of length 1, confidence
-    outside [0, 1]) or the
-    file cannot be written; then nothing is written.
+    Raises InputError if a grasp is not usable (name twice, not finite, quaternion not of length 1, confidence outside
+    [0, 1]) or the file cannot be written; then nothing is written.
     """
     entries: dict[str, dict[str, Any]] = {}
     for grasp in grasps:
@@ -145,9 +143,8 @@ def grasp_to_dict(value: object) -> Any:
     """Return a grasp, or anything made of dataclasses, named tuples, arrays, mappings and numbers, as plain JSON data.
 
     Arrays become nested lists, numbers that are not finite become None (JSON has no NaN). Dataclass fields whose
-    metadata
-    say `derived` are left out: they follow from the others.
-    Raises InputError for a value that has no plain form.
+    metadata say `derived` are left out: they follow from the others. Raises InputError for a value that has no plain
+    form.
     """
     if value is None or isinstance(value, (str, bool)):
         return value

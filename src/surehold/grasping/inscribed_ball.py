@@ -7,9 +7,9 @@ h(u)     support function of H, for a unit vector u (6,)
 epsilon  radius of the largest ball about the origin in H: min of h(u) over u, 0 if that is negative
 
 Distances below 1e-11 of the largest wrench are exactly 0. epsilon comes from the compiled expansion of the nearest
-facet;
-should rounding spoil it (wrenches apart by about that tolerance can), from a second one with a coarser tolerance, and
-should that fail too, from the full hull of joggled wrenches (Qhull). Numerical failure is never scored as 0.
+facet. Should rounding spoil that, as wrenches apart by about that tolerance can, it is repeated with a coarser
+tolerance; should that fail too, the full hull of joggled wrenches (Qhull) decides, or for round cones the bounds
+reached so far. Numerical failure is never scored as 0.
 """
 
 from typing import NamedTuple
@@ -25,6 +25,8 @@ __all__ = ["InscribedBall", "ball_radius", "hull_volume", "inscribed_ball", "nea
 
 TOLERANCES = (1e-11, 1e-9)
 """Tried in turn: distances below this fraction of the largest wrench count as zero."""
+ROUND_TOLERANCES = (1e-11, 1e-9, 1e-7)
+"""The same for round cones, which Qhull cannot take."""
 FACET_BUDGETS = (4096, 65_536, 1_048_576)
 """Memory for so many facets is tried in turn; grasps need hundreds to thousands."""
 ROUND_FACET_BUDGETS = (16_384, 65_536)
@@ -55,7 +57,7 @@ class InscribedBall(NamedTuple):
     facets: int
     """Facets made on the way."""
     fallbacks: int
-    """0: as planned; 1: rounding spoiled the expansion, a coarser tolerance was used; 2: the full hull by Qhull was."""
+    """0: as planned; else how often rounding spoiled the expansion: a coarser tolerance helps, or the full hull."""
 
     @property
     def radius(self) -> float:
@@ -172,7 +174,9 @@ def _expand(
     centers, axes = (np.array(a, np.float64, order="C") for a in round_contacts or _NO_ROUND)
     gap = ROUND_GAP if len(centers) else 0.0
     budgets = ROUND_FACET_BUDGETS if len(centers) else FACET_BUDGETS
-    for fallbacks, tolerance in enumerate(TOLERANCES):
+    tolerances = ROUND_TOLERANCES if len(centers) else TOLERANCES
+    best = FAILED, 0.0, 0.0, flat, 0, 0, len(tolerances)
+    for fallbacks, tolerance in enumerate(tolerances):
         result = expand_nearest(w, centers, axes, tolerance, gap, budgets[0])
         for budget in budgets[1:]:
             if result[0] != SPENT:
@@ -185,7 +189,9 @@ def _expand(
             status = OUTSIDE
         if status in (DONE, FLAT, OUTSIDE):
             return status, lower, upper, normal, expansions, facets, fallbacks
-    return FAILED, 0.0, 0.0, flat, 0, 0, len(TOLERANCES)
+        if len(centers) and lower > max(best[1], tolerance * _largest(w)):
+            best = DONE, lower, upper, normal, expansions, facets, len(tolerances)
+    return best
 
 
 def _ball_from_hull(w: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

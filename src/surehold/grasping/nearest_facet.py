@@ -14,12 +14,11 @@ Method. Start from a simplex P of seven wrenches far apart. Take the facet of P 
 above it, that is h(n) = d, then epsilon = d: the facets of P bound a part of H and none is nearer. Otherwise add the
 wrench s farthest above it: remove all facets that s sees and join s to their horizon (beneath-beyond).
 
-The plane of a new facet is not computed from its vertices. It contains the horizon ridge between a facet A that s sees
-and a facet B that it does not see, hence it is the *positive* combination A(s) B - B(s) A of their planes, as in the
-double
-description method (Motzkin et al. 1953). There is no cancellation and no orientation test, and if s is coplanar with B
-the new facet inherits the plane of B. That makes friction cones, contact patches and symmetric grasps harmless, whose
-wrenches are coplanar by the dozen and force Qhull to joggle them.
+The plane of a new facet is not computed from its vertices. It contains the horizon ridge between a facet A that s
+sees and a facet B that it does not see, hence it is the *positive* combination A(s) B - B(s) A of their planes, as in
+the double description method (Motzkin et al. 1953). There is no cancellation and no orientation test, and if s is
+coplanar with B the new facet inherits the plane of B. That makes friction cones, contact patches and symmetric grasps
+harmless, whose wrenches are coplanar by the dozen and force Qhull to joggle them.
 
 s sees a facet if it lies above it by more than a tolerance. Not to see coplanar facets is the placing triangulation,
 which is consistent however degenerate the wrenches are.
@@ -47,10 +46,11 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, max_facets):
     """Expand the facet nearest to the origin until it is a facet of the hull.
 
     Arguments: wrenches (m, 6), 7 <= m < 65536; round contacts centers (c, 6) and axes (c, 6, 3), beside the wrenches;
-    tolerance, below which distances count as zero, and gap, the difference of the bounds at which to stop early (0 for
-    none), both as fractions of the largest wrench; max_facets, to stop at.
-    Return (status, lower, upper, u, expansions, facets) with h(u) = upper, u (6,). For DONE and SPENT lower <= epsilon
-    <= upper (where lower is positive); for OUTSIDE upper < 0; for FLAT and FAILED the bounds mean nothing.
+    tolerance, below which distances count as zero, and gap, the difference of the bounds at which to stop early (0
+    for none), both as fractions of the largest wrench; max_facets, to stop at. Return (status, lower, upper, u,
+    expansions, facets) with h(u) = upper, u (6,). For DONE and SPENT lower <= epsilon <= upper (where lower is
+    positive), and for FAILED too, before the step that failed; for OUTSIDE upper < 0; for FLAT the bounds mean
+    nothing.
     """
     m = len(wrenches)
     points = np.empty((m if len(centers) == 0 else m + max_facets // 16, 6))

@@ -1,14 +1,14 @@
 """The quality of the simulator behind the thesis ("simox"), its slips included, so that levels can be compared.
 
 Notation: see contact_wrenches.py. It differs from epsilon in these points, all as in the original program:
+
 - edge forces have magnitude one, eight to a cone, and every cone is 45 degrees wide (mu = 1), whatever the friction is;
-- torques are divided by half the longest side of the object's axis-aligned box, about the plain mean of the mesh's
-vertices;
+- torques are divided by half the longest side of the object's axis-aligned box, about the plain mean of the vertices;
 - the radius is measured about the mean of the hull's *vertices*, not about the origin: it is positive without force
   closure too, and adding a contact may lower it;
-- quality is that radius divided by the same number of the object wrench space: the hull of the wrenches of contacts
-at the
-  centroids of up to 300 faces of the mesh.
+- quality is that radius divided by the same number of the object wrench space: the hull of the wrenches of contacts at
+  the centroids of up to 300 faces of the mesh.
+
 Where the original draws 300 faces at random, evenly spaced ones are taken here. The object's number depends on how the
 mesh is triangulated, by several percent for coarse meshes.
 """
@@ -43,9 +43,9 @@ class ObjectWrenchSpace:
 def object_wrench_space(vertices: ArrayLike, faces: ArrayLike, max_faces: int = 300) -> ObjectWrenchSpace:
     """Measure the wrench space of a triangle mesh with outward winding, for `simox_quality`.
 
-    Parameters: vertices (v, 3) [m]; faces (f, 3), indices of vertices; max_faces, evenly spaced faces are taken
-    if there are more.
-    Raises InputError if the arrays are unusable or the mesh has no volume of wrenches (a flat or empty mesh).
+    Parameters: vertices (v, 3) [m]; faces (f, 3), indices of vertices; max_faces, evenly spaced faces are taken if
+    there are more. Raises InputError if the arrays are unusable or the mesh has no volume of wrenches (a flat or
+    empty mesh).
     """
     v = finite_array("vertices", vertices, (None, 3))
     f = np.asarray(faces)
@@ -76,8 +76,7 @@ def simox_quality(points: ArrayLike, normals: ArrayLike, space: ObjectWrenchSpac
     """Return the simox quality of contacts: points (c, 3) [m] and inward unit normals (c, 3) in the mesh's frame.
 
     0 for fewer than two contacts or contacts whose wrenches are flat; may be positive without force closure. The
-    original program
-    reports up to 0.79 for power grasps. Raises InputError for unusable arrays.
+    original program reports up to 0.79 for power grasps. Raises InputError for unusable arrays.
     """
     wrenches = _wrenches(points, normals, space.torque_length, space.origin)
     return _vertex_centered_radius(wrenches) / space.radius if len(wrenches) >= 2 * EDGES else 0.0
@@ -102,8 +101,8 @@ def _hull_vertices(wrenches: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return which wrenches are vertices of their hull, exactly, for forces of magnitude one.
 
     Points of the unit sphere are all extreme. Hence a wrench can be a mixture only of wrenches with the very same
-    force; their torques
-    lie in the plane perpendicular to the force, and the extreme ones among them are corners of a planar convex hull.
+    force; their torques lie in the plane perpendicular to the force, and the extreme ones among them are corners of a
+    planar convex hull.
     """
     forces = np.round(wrenches[:, :3], 9) + 0.0  # no negative zeros
     _, group, counts = np.unique(forces, axis=0, return_inverse=True, return_counts=True)

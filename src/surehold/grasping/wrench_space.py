@@ -1,19 +1,15 @@
 """Quality of a set of contacts by the convex hull of the wrenches they can apply.
 
 Notation: see contact_wrenches.py; epsilon is the radius of the largest ball about the origin inside the convex hull
-of the union
-of all contacts' wrenches (Ferrari and Canny 1992, L1 hull), volume that hull's volume.
+of the union of all contacts' wrenches (Ferrari and Canny 1992, L1 hull), volume that hull's volume.
 
 Continuity. epsilon = max(0, min over unit u of h(u)) with the support function h(u) = max over wrenches of u.w. It
 changes by no more than the largest displacement of a wrench. A contact whose weight falls to zero draws its wrenches
-to the
-origin; and adding the origin to the hull changes no ball about the origin: if epsilon > 0 it is inside already, and
-if some
-h(u) <= 0 then max(h(u), 0) = 0 as before. Therefore a contact of weight zero, which is left out, is the limit of a
-contact of small
-weight, and epsilon is continuous there. `signed_epsilon` is continuous in points and normals, but its
-negative part is not in vanishing weights: the distance to the hull is small as soon as a tiny wrench appears near the
-origin.
+to the origin; and adding the origin to the hull changes no ball about the origin: if epsilon > 0 it is inside
+already, and if some h(u) <= 0 then max(h(u), 0) = 0 as before. Therefore a contact of weight zero, which is left out,
+is the limit of a contact of small weight, and epsilon is continuous there. `signed_epsilon` is continuous in points
+and normals, but its negative part is not in vanishing weights: the distance to the hull is small as soon as a tiny
+wrench appears near the origin.
 
 Polyhedral cones depend on where their edges point; round cones do not, and with them epsilon is continuous in all
 normals.
@@ -68,7 +64,7 @@ class WrenchQuality:
     weakest: NDArray[np.float64] = field(repr=False, compare=False)
     """Unit wrench direction in which the grasp resists least, (6,)."""
     fallbacks: int
-    """0: as planned; 1: rounding spoiled the expansion, a coarser tolerance was used; 2: the full hull by Qhull was."""
+    """0: as planned; else how often rounding spoiled the expansion: a coarser tolerance helps, or the full hull."""
     wrenches: NDArray[np.float64] = field(repr=False, compare=False, metadata={"derived": True})
     """Wrenches of the cone edges, (m, 6)."""
 
