@@ -137,7 +137,10 @@ def close_hand(nodes, frame, bases, chains, reach, motion, radius, palm, half, r
         open_until[i] = until
     looks = 0
     while True:
-        i = int(np.argmin(open_until))
+        i = 0
+        for k in range(1, total):
+            if open_until[k] < open_until[i]:
+                i = k
         t = open_until[i]
         if t >= closed:
             break

@@ -23,10 +23,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from surehold.grasping.clearance import capsule_gap
+from surehold.grasping.closing import link_ends
 from surehold.grasping.distance_field import field_distance, field_distance_gradient
-from surehold.grasping.hand import PALM, link_name
+from surehold.grasping.hand import PALM, Hand, link_name
 
-__all__ = ["CONTACT_MODELS", "DEPTH", "Contacts", "as_contacts", "skin_contacts", "touch_contacts"]
+__all__ = ["CONTACT_MODELS", "DEPTH", "Contacts", "as_contacts", "skin_contacts", "skin_samples", "touch_contacts"]
+
+Array = NDArray[np.float64]
 
 CONTACT_MODELS: Final = ("graded", "patch", "single")
 DEPTH: Final = 0.003  #: depth of the soft touch, delta [m]
@@ -82,97 +85,96 @@ def touch_contacts(nodes, frame, ends, touched, radius):
     return rows[:n]
 
 
-@njit(cache=True)
-def link_samples(radius, length, round_end, stations, around):
+def link_samples(radius: float, length: float, round_end: bool) -> Array:
     """Return skin samples (m, 6) of a link along z: place, outward normal. `round_end` adds the far end's half ball.
 
-    A ring of `around` samples at the middle of each of `stations` equal pieces; on the half ball two rings and the tip.
+    A ring of `AROUND` samples at the middle of each of `STATIONS` equal pieces; on the half ball two rings and the tip.
     """
-    rows = np.empty((stations * around + (around + around // 2 + 1 if round_end else 0), 6))
-    n = 0
-    for s in range(stations + (3 if round_end else 0)):
-        latitude = 0.0 if s < stations else np.pi / 6.0 * (s - stations + 1)
-        height = length * (s + 0.5) / stations if s < stations else length
-        count = around if latitude < 0.9 else (around // 2 if latitude < 1.3 else 1)
-        for a in range(count):
-            angle = 2.0 * np.pi * a / count
-            rows[n, 3] = np.cos(latitude) * np.cos(angle)
-            rows[n, 4] = np.cos(latitude) * np.sin(angle)
-            rows[n, 5] = np.sin(latitude)
-            rows[n, 0], rows[n, 1] = radius * rows[n, 3], radius * rows[n, 4]
-            rows[n, 2] = height + radius * rows[n, 5]
-            n += 1
-    return rows
+    rings = [(length * (s + 0.5) / STATIONS, 0.0, AROUND) for s in range(STATIONS)]
+    if round_end:
+        rings += [(length, np.pi / 6.0, AROUND), (length, np.pi / 3.0, AROUND // 2), (length, np.pi / 2.0, 1)]
+    rows = []
+    for height, latitude, count in rings:
+        angle = 2.0 * np.pi * np.arange(count) / count
+        c = np.cos(latitude)
+        normal = np.column_stack([c * np.cos(angle), c * np.sin(angle), np.full(count, np.sin(latitude))])
+        rows.append(np.column_stack([radius * normal + [0.0, 0.0, height], normal]))
+    return np.vstack(rows)
 
 
-@njit(cache=True)
-def palm_samples(half, rounding, pitch):
+def palm_samples(half: Array, rounding: float) -> Array:
     """Return skin samples (m, 6) of the flat inner face of the palm, in its box's frame: place and outward normal."""
-    n1 = int(np.ceil(2.0 * (half[0] - rounding) / pitch)) + 1
-    n2 = int(np.ceil(2.0 * (half[1] - rounding) / pitch)) + 1
-    rows = np.zeros((n1 * n2, 6))
-    for i in range(n1):
-        for j in range(n2):
-            row = rows[i * n2 + j]
-            row[0] = (half[0] - rounding) * (2.0 * i / (n1 - 1) - 1.0)
-            row[1] = (half[1] - rounding) * (2.0 * j / (n2 - 1) - 1.0)
-            row[2], row[5] = half[2], 1.0
-    return rows
+    reach = half[:2] - rounding
+    u, v = (r * np.linspace(-1.0, 1.0, int(np.ceil(2.0 * r / PALM_PITCH)) + 1) for r in reach)
+    place = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+    n = len(place)
+    return np.column_stack([place, np.full(n, half[2]), np.zeros((n, 2)), np.ones(n)])
 
 
-@njit(cache=True)
-def _skin(rows, n, nodes, frame, pose, samples, depth, skin, graded, body):
-    """Add the contacts of one body's samples; `pose` (3, 4) carries them to the object's frame."""
-    for i in range(samples.shape[0]):
-        s = samples[i]
-        x = pose[0, 0] * s[0] + pose[0, 1] * s[1] + pose[0, 2] * s[2] + pose[0, 3]
-        y = pose[1, 0] * s[0] + pose[1, 1] * s[1] + pose[1, 2] * s[2] + pose[1, 3]
-        z = pose[2, 0] * s[0] + pose[2, 1] * s[1] + pose[2, 2] * s[2] + pose[2, 3]
-        d = field_distance(nodes, frame, x, y, z)
-        if d < depth:
-            x -= skin * (pose[0, 0] * s[3] + pose[0, 1] * s[4] + pose[0, 2] * s[5])
-            y -= skin * (pose[1, 0] * s[3] + pose[1, 1] * s[4] + pose[1, 2] * s[5])
-            z -= skin * (pose[2, 0] * s[3] + pose[2, 1] * s[4] + pose[2, 2] * s[5])
-            weight = min(1.0 - d / depth, 1.0) if graded else 1.0
-            n = _put(rows, n, nodes, frame, x, y, z, weight, body)
-    return n
+def skin_samples(hand: Hand) -> Array:
+    """Return all skin samples (m, 7) of a hand: number of the body; place [m] and outward normal in its frame.
 
-
-@njit(cache=True)
-def skin_contacts(
-    nodes, frame, ends, sides, radius, palm, half, rounding, depth, skin, stations, around, pitch, graded
-):
-    """Return contacts (c, 8) of all skin samples nearer than `depth`: point, inward normal, weight, body.
-
-    `sides` (5, 3) is the bending axis of each finger: the samples of a ring are counted from it.
+    The frame of a link has its origin at the near end and z along the link, that of the palm is its box's.
     """
-    flat = palm_samples(half, rounding, pitch)
-    rows = np.empty((20 * (stations + 2) * around + flat.shape[0], 8))
-    pose = np.empty((3, 4))
-    n = 0
-    for body in range(20):
-        near, far = ends[body, 0], ends[body, 1]
-        axis = far - near
-        length = np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
-        middle = 0.5 * (near + far)
-        if field_distance(nodes, frame, middle[0], middle[1], middle[2]) > 0.5 * length + radius + depth:
-            continue
-        side = sides[body // 4]
-        lean = (side[0] * axis[0] + side[1] * axis[1] + side[2] * axis[2]) / length**2
-        size = 0.0
+    lengths = np.linalg.norm(
+        np.diff(link_ends(hand.bases, hand.chains, 0.5 * (hand.lower + hand.upper)), axis=1), axis=2
+    )
+    parts = [link_samples(hand.radius, float(lengths[body, 0]), body % 4 == 3) for body in range(PALM)]
+    parts.append(palm_samples(hand.palm_half_extents, hand.palm_rounding))
+    return np.vstack([np.column_stack([np.full(len(part), body), part]) for body, part in enumerate(parts)])
+
+
+@njit(cache=True)
+def skin_contacts(nodes, frame, ends, sides, radius, palm, samples, depth, skin, graded):
+    """Return contacts (c, 8) of all skin samples (m, 7) nearer than `depth`: point, inward normal, weight, body.
+
+    `sides` (5, 3) is the bending axis of each finger: the x axis of its links' frames is it, without its part along z.
+    """
+    pose = np.empty((21, 3, 4))
+    away = np.zeros(21, dtype=np.bool_)
+    for i in range(3):
+        for j in range(4):
+            pose[PALM, i, j] = palm[i, j]
+    for body in range(PALM):
+        length, lean, size = 0.0, 0.0, 0.0
         for i in range(3):
-            pose[i, 0] = side[i] - lean * axis[i]
-            size += pose[i, 0] ** 2
-            pose[i, 2] = axis[i] / length
-            pose[i, 3] = near[i]
+            pose[body, i, 3] = ends[body, 0, i]
+            pose[body, i, 2] = ends[body, 1, i] - ends[body, 0, i]
+            length += pose[body, i, 2] ** 2
+        length = np.sqrt(length)
         for i in range(3):
-            pose[i, 0] /= np.sqrt(size)
+            pose[body, i, 2] /= length
+            lean += pose[body, i, 2] * sides[body // 4, i]
+        for i in range(3):
+            pose[body, i, 0] = sides[body // 4, i] - lean * pose[body, i, 2]
+            size += pose[body, i, 0] ** 2
+        size = np.sqrt(size)
+        for i in range(3):
+            pose[body, i, 0] /= size
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            pose[i, 1] = pose[j, 2] * pose[k, 0] - pose[k, 2] * pose[j, 0]
-        samples = link_samples(radius, length, body % 4 == 3, stations, around)
-        n = _skin(rows, n, nodes, frame, pose, samples, depth, skin, graded, body)
-    n = _skin(rows, n, nodes, frame, palm, flat, depth, skin, graded, PALM)
+            pose[body, i, 1] = pose[body, j, 2] * pose[body, k, 0] - pose[body, k, 2] * pose[body, j, 0]
+        x, y, z = (pose[body, 0, 3], pose[body, 1, 3], pose[body, 2, 3])
+        away[body] = field_distance(nodes, frame, x, y, z) > length + radius + depth
+    rows = np.empty((samples.shape[0], 8))
+    n = 0
+    for m in range(samples.shape[0]):
+        body = int(samples[m, 0])
+        if away[body]:
+            continue
+        x, y, z = pose[body, 0, 3], pose[body, 1, 3], pose[body, 2, 3]
+        u, v, w = 0.0, 0.0, 0.0
+        for i in range(3):
+            x += pose[body, 0, i] * samples[m, 1 + i]
+            y += pose[body, 1, i] * samples[m, 1 + i]
+            z += pose[body, 2, i] * samples[m, 1 + i]
+            u += pose[body, 0, i] * samples[m, 4 + i]
+            v += pose[body, 1, i] * samples[m, 4 + i]
+            w += pose[body, 2, i] * samples[m, 4 + i]
+        d = field_distance(nodes, frame, x, y, z)
+        if d < depth:
+            weight = min(1.0 - d / depth, 1.0) if graded else 1.0
+            n = _put(rows, n, nodes, frame, x - skin * u, y - skin * v, z - skin * w, weight, body)
     return rows[:n]
 
 

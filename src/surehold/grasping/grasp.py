@@ -9,15 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.closing import CLOSING_MODES, close_hand, hand_gaps, link_ends
 from surehold.grasping.contacts import (
-    AROUND,
     CONTACT_MODELS,
     DEPTH,
-    PALM_PITCH,
     SKIN,
-    STATIONS,
     Contacts,
     as_contacts,
     skin_contacts,
+    skin_samples,
     touch_contacts,
 )
 from surehold.grasping.distance_field import DistanceField, distance_field
@@ -141,6 +139,7 @@ class Simulator:
         self.object_pose: Final[Pose] = Pose() if object_pose is None else object_pose
         self.field: Final[DistanceField] = distance_field(self.object)
         self._reach: Final[Array] = self.hand.reach()
+        self._samples: Final[Array] = skin_samples(self.hand)
 
     def grasp(self, pose: Pose, s1: float = 0.0) -> Grasp:
         """Close the hand at a pose of its palm in the world with posture s1 [rad]; a bad grasp has quality 0.
@@ -268,12 +267,8 @@ class Simulator:
             geometry.sides,
             self.hand.radius,
             geometry.palm,
-            self.hand.palm_half_extents,
-            self.hand.palm_rounding,
+            self._samples,
             self.depth,
             SKIN,
-            STATIONS,
-            AROUND,
-            PALM_PITCH,
             self.contact == "graded",
         )
