@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 
 from surehold.reports import figures
+from surehold.reports.drawing import PALETTE
 
 
 def test_every_figure_is_drawn(gm_report, rkhs_report):
@@ -35,7 +36,7 @@ def test_inline_figures_follow_the_page(gm_report):
     assert root.attrib["aria-label"] == 'what "shaking" does'
     assert "var(--ink)" in text
     assert "var(--high)" in text
-    assert not any(color in text for color in figures.PALETTE.values())
+    assert not any(color in text for color in PALETTE.values())
 
 
 def test_the_histogram_counts_every_query(gm_report):

@@ -1,0 +1,250 @@
+"""What the figures draw into their axes: histograms, maps, lines and traces, in one style and one palette."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from surehold.reports.run_report import Candidate, RunReport, Surface
+from surehold.reports.verdict import number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["PALETTE", "draw_line", "draw_map", "draw_shake", "draw_trace", "style"]
+
+#: Okabe and Ito's vermilion and blue (told apart by color-blind readers), darkened for contrast on white.
+PALETTE: Final = {"ink": "#1b1f25", "muted": "#68707b", "grid": "#d8dce2", "high": "#c24e00", "answer": "#0a65b3"}
+_MARKERS: Final = {"high": "^", "answer": "o"}
+_STYLE: Final = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9.5,
+    "text.color": PALETTE["ink"],
+    "text.parse_math": False,  # a user's "$" is a "$"
+    "axes.edgecolor": PALETTE["muted"],
+    "axes.labelcolor": PALETTE["ink"],
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.unicode_minus": True,
+    "xtick.color": PALETTE["muted"],
+    "ytick.color": PALETTE["muted"],
+    "xtick.labelcolor": PALETTE["ink"],
+    "ytick.labelcolor": PALETTE["ink"],
+    "grid.color": PALETTE["grid"],
+    "legend.frameon": False,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "svg.fonttype": "none",  # text stays text: small, searchable, in the reader's font
+}
+
+
+@contextmanager
+def style(salt: str) -> Iterator[None]:
+    """Set matplotlib's style for the block; `salt` makes the identifiers in an SVG the same every time."""
+    import matplotlib
+
+    settings: dict[Any, Any] = {**_STYLE, "svg.hashsalt": salt}
+    with matplotlib.rc_context(settings):
+        yield
+
+
+def _role(report: RunReport, candidate: Candidate) -> str:
+    return "high" if candidate is report.highest and len(report.candidates) > 1 else "answer"
+
+
+def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
+    """Draw the histogram of a candidate's re-queries, on the axes that all candidates share."""
+    from matplotlib.ticker import MaxNLocator
+
+    everything = np.concatenate([np.append(c.values, c.quality) for c in report.candidates])
+    everything = everything[np.isfinite(everything)]
+    low, high = float(everything.min()), float(everything.max())
+    margin = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
+    color = PALETTE[_role(report, candidate)]
+    edges = np.linspace(low - margin, high + margin, 28)
+    tallest = max(np.histogram(c.values, edges)[0].max() for c in report.candidates)
+    counts, _ = np.histogram(candidate.values, edges)
+    axes.bar(edges[:-1], counts, np.diff(edges), align="edge", color=color, alpha=0.75, linewidth=0)
+    axes.axvline(candidate.quality, color=PALETTE["ink"], linestyle=(0, (4, 2)), linewidth=1.2)
+    axes.plot(candidate.mean, 0, marker="D", color=color, markeredgecolor=PALETTE["ink"], clip_on=False, zorder=5)
+    right = candidate.quality > 0.6 * high + 0.4 * low
+    axes.annotate(
+        "hit exactly",
+        (candidate.quality, 1.0),
+        xycoords=("data", "axes fraction"),
+        xytext=(-4 if right else 4, 0),
+        textcoords="offset points",
+        ha="right" if right else "left",
+        va="top",
+        fontsize=8.5,
+    )
+    axes.set_xlim(edges[0], edges[-1])
+    axes.set_ylim(0.0, 1.18 * tallest)
+    axes.set_xlabel(f"{report.quality_name} (◆ mean {number(candidate.mean)})")
+    axes.set_ylabel("re-queries")
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=3, integer=True))
+
+
+def draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> None:
+    """Draw the model over two variables with the trials and the candidates; `robust`: its average over the noise."""
+    values = view.robust_mean if robust and view.robust_mean is not None else view.mean
+    both = [v for v in (view.mean, view.robust_mean) if v is not None]
+    low, high = min(float(v.min()) for v in both), max(float(v.max()) for v in both)
+    i, j = view.variables
+    first, second = report.variables[i], report.variables[j]
+    a, b = view.axes[0] * first.factor, view.axes[1] * second.factor
+    extent = (_edge(a, 0), _edge(a, -1), _edge(b, 0), _edge(b, -1))
+    image = axes.imshow(
+        values.T,
+        origin="lower",
+        extent=extent,
+        aspect="auto",
+        cmap="viridis",
+        vmin=low,
+        vmax=high,
+        interpolation="bicubic",
+    )
+    if high > low:
+        axes.contour(
+            a,
+            b,
+            values.T,
+            levels=np.linspace(low, high, 9)[1:-1],
+            colors="white",
+            linewidths=0.5,
+            linestyles="solid",
+            alpha=0.4,
+        )
+    sliced = len(report.variables) > 2
+    X = report.X[:, [i, j]] * [first.factor, second.factor]
+    initial = np.arange(report.y.size) < report.n_initial
+    ok = ~report.failed
+    alpha = 0.45 if sliced else 0.95
+    axes.scatter(*X[ok & initial].T, s=15, facecolors="none", edgecolors="white", linewidths=1.0, alpha=alpha)
+    axes.scatter(*X[ok & ~initial].T, s=11, c="white", edgecolors="black", linewidths=0.4, alpha=alpha)
+    axes.scatter(*X[~ok].T, s=18, c="white", marker="x", linewidths=1.0, alpha=alpha)
+    for candidate in report.candidates:
+        _draw_candidate(axes, report, candidate, (i, j))
+    axes.set(xlabel=first.label, ylabel=second.label, xlim=extent[:2], ylim=extent[2:])
+    axes.set_title("Unscented mean (over the input noise)" if robust else "Model mean (input hit exactly)")
+    bar = axes.figure.colorbar(image, ax=axes, fraction=0.05, pad=0.02, aspect=25)
+    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    bar.set_label(report.quality_name)
+
+
+def _draw_candidate(axes: "Axes", report: RunReport, candidate: Candidate, pair: tuple[int, int]) -> None:
+    from matplotlib.patches import Ellipse
+
+    role = _role(report, candidate)
+    scale = np.array([report.variables[k].factor for k in pair])
+    center = candidate.x[list(pair)] * scale
+    if report.noise is not None:
+        covariance = report.noise[np.ix_(pair, pair)] * np.outer(scale, scale)
+        values, vectors = np.linalg.eigh(covariance)
+        angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
+        width, height = 4.0 * np.sqrt(np.maximum(values[::-1], 0.0))  # two standard deviations to each side
+        for line, color in ((2.6, "white"), (1.4, PALETTE[role])):
+            axes.add_patch(
+                Ellipse(
+                    tuple(center), width, height, angle=angle, fill=False, edgecolor=color, linewidth=line, zorder=4
+                )
+            )
+    axes.plot(
+        *center,
+        marker=_MARKERS[role],
+        color=PALETTE[role],
+        markersize=9,
+        markeredgecolor="white",
+        markeredgewidth=1.4,
+        zorder=6,
+    )
+
+
+def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
+    """Draw the model over one variable, its average over the noise, the trials and the candidates."""
+    (i,) = view.variables
+    variable = report.variables[i]
+    t = view.axes[0] * variable.factor
+    if view.std is not None:
+        axes.fill_between(
+            t, view.mean - 2 * view.std, view.mean + 2 * view.std, color=PALETTE["muted"], alpha=0.22, linewidth=0
+        )
+    axes.plot(t, view.mean, color=PALETTE["ink"], linewidth=1.2, label="model (mean ± 2 standard deviations)")
+    if view.robust_mean is not None:
+        axes.plot(t, view.robust_mean, color=PALETTE["answer"], linewidth=2.0, label="averaged over the input noise")
+    ok = ~report.failed
+    axes.plot(
+        report.X[ok, i] * variable.factor, report.y[ok], "o", color=PALETTE["muted"], markersize=3.5, label="trials"
+    )
+    for candidate in report.candidates:
+        role = _role(report, candidate)
+        spread = 0.0 if report.noise is None else 2.0 * float(np.sqrt(report.noise[i, i])) * variable.factor
+        axes.errorbar(
+            candidate.x[i] * variable.factor,
+            candidate.quality,
+            xerr=spread or None,
+            fmt=_MARKERS[role],
+            color=PALETTE[role],
+            markersize=9,
+            markeredgecolor="white",
+            ecolor=PALETTE[role],
+            elinewidth=1.8,
+            zorder=6,
+            label=candidate.label,
+        )
+    everything = np.concatenate([view.mean, report.y[ok]])
+    margin = 0.25 * (everything.max() - everything.min()) or 1.0
+    axes.set(xlabel=variable.label, ylabel=report.quality_name, xlim=(t[0], t[-1]))
+    axes.set_ylim(everything.min() - margin, everything.max() + margin)
+    axes.legend(fontsize=8, loc="best")
+    axes.set_title("Model and trials")
+
+
+def draw_trace(axes: "Axes", report: RunReport) -> None:
+    """Draw best and robust value by trial, over the values of the single trials."""
+    k = np.arange(1, report.y.size + 1)
+    axes.plot(k, report.y, "o", color=PALETTE["muted"], markersize=2.8, alpha=0.7, label="trial")
+    failed = report.failed
+    if failed.any():
+        floor = float(np.nanmin(report.y)) if (~failed).any() else 0.0
+        axes.plot(
+            k[failed], np.full(failed.sum(), floor), "x", color=PALETTE["muted"], markersize=5, label="failed trial"
+        )
+    axes.step(k, report.best_trace, where="post", color=PALETTE["high"], linewidth=1.8, label="highest value so far")
+    if report.robust_trace is not None and np.isfinite(report.robust_trace).any():
+        axes.plot(
+            k,
+            report.robust_trace,
+            color=PALETTE["answer"],
+            linewidth=1.8,
+            label="recommended: expected under the noise",
+        )
+    if 0 < report.n_initial < report.y.size:
+        axes.axvspan(0.5, report.n_initial + 0.5, color=PALETTE["grid"], alpha=0.45, linewidth=0, zorder=0)
+        axes.annotate(
+            "initial design",
+            (report.n_initial / 2 + 0.5, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, -3),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            fontsize=8.5,
+            color=PALETTE["muted"],
+        )
+    axes.margins(y=0.12)
+    axes.set(xlabel="trial", ylabel=report.quality_name, xlim=(0.5, max(report.y.size + 0.5, 1.6)))
+    axes.grid(axis="y", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.figure.legend(loc="outside upper left", ncols=2, fontsize=8.5, borderaxespad=0.2)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def _edge(ticks: np.ndarray, end: int) -> float:
+    """Return the outer border of the first or last cell of a regular grid."""
+    half = 0.5 * (ticks[1] - ticks[0])
+    return float(ticks[0] - half if end == 0 else ticks[-1] + half)
