@@ -95,9 +95,9 @@ def gravity_wrenches(
     """Return the external wrenches of gravity, (k, 6), for `task_quality`.
 
     Parameters: weight, mass times 9.81 divided by the normal force that all contacts together may apply (then a
-    quality of 1 means: just held); center_of_mass (3,) [m]; directions (k, 3) unit vectors in which gravity may point, default the six axis
-    directions; torque_length [m] and origin [m] as given to `contact_wrenches`. Raises InputError for unusable
-    values.
+    quality of 1 means: just held); center_of_mass (3,) [m]; directions (k, 3) unit vectors in which gravity may
+    point, default the six axis directions; torque_length [m] and origin [m] as given to `contact_wrenches`. Raises
+    InputError for unusable values.
     """
     if not (isinstance(weight, (int, float)) and np.isfinite(weight) and weight > 0.0):
         raise InputError(f"weight must be finite and above 0, not {weight!r}.")
