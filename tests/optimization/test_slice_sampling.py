@@ -96,7 +96,7 @@ def test_bounded_support_is_respected():
 
 
 def test_joint_distribution_of_hyperparameters_and_data():
-    """Geweke 2004: draw theta from the prior, data given theta, then run the chain on those data; theta keeps its prior."""
+    """Geweke 2004: draw theta from the prior, data given theta, then the chain on them; theta is as before."""
     rng = np.random.default_rng(3)
     X = rng.random((6, 1))
     after = []

@@ -297,9 +297,9 @@ class GaussianProcessPosterior:
         scale = self.outputs.scale
         return Moments(
             self.outputs.shift * weights.sum() + scale * mean,
-            scale**2 * variance,
+            self.outputs.square * variance,
             scale * mean_gradient if gradient else None,
-            scale**2 * variance_gradient if gradient else None,
+            self.outputs.square * variance_gradient if gradient else None,
         )
 
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
@@ -429,8 +429,10 @@ class GaussianProcess:
         `previous` is the posterior of the step before; its last particle starts the chain where the learning says so.
         """
         d = X.shape[1]
+        if self._length_scales is not None and self._length_scales.shape not in ((), (1,), (d,)):
+            raise InputError(f"length_scales have shape {self._length_scales.shape}; the inputs need ({d},).")
         outputs = Standardization.of(y, self._output_range) if self._standardize else Standardization.identity(y)
-        known = 0.0 if isinstance(self._noise, str) else (self._noise / outputs.scale) ** 2
+        known = 0.0 if isinstance(self._noise, str) else min(self._noise / outputs.scale, 1e100) ** 2
         learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred"
         prior = self._prior or Prior((log(0.2 * sqrt(d)), 1.0))
         prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise)

@@ -1,6 +1,6 @@
 """Outputs on a common scale: what the surrogate learns from is (y - shift) / scale."""
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,9 @@ from surehold.errors import InputError
 
 __all__ = ["Standardization"]
 
-_FLAT = 1e-12  # a spread below this fraction of the largest |y| is rounding, not information
+_FLAT: Final = 1e-12  # a spread below this fraction of the largest |y| is rounding, not information
+_SMALLEST: Final = 1e-150  # a spread below this, squared, is 0 in double precision
+_LARGEST: Final = 1e150  # and the square of one above this is infinite
 
 
 class Standardization(NamedTuple):
@@ -31,18 +33,25 @@ class Standardization(NamedTuple):
     def of(cls, y: NDArray[np.float64], output_range: tuple[float, float] | None = None) -> "Standardization":
         """Return the map to zero mean and unit standard deviation of y (n,).
 
-        Outputs that do not differ say nothing about the scale: they are only centered, and `flat` says so. A stated
+        Outputs that do not differ, or by less than 1e-150, say nothing about the scale: they are only centered, and
+        `flat` says so. A stated
         `output_range` (lowest and highest value to expect) sets the scale instead: the range counts as four
         standard deviations, or the data's own spread where that is larger.
         """
         flat = _is_flat(y)
-        shift = float(y.mean()) if len(y) else 0.0
-        spread = 0.0 if flat else float(y.std())
-        if not np.isfinite(spread):  # squares of outputs near the largest float overflow
-            spread = float(np.abs(y - shift).max())
+        top = float(np.abs(y).max()) if len(y) else 0.0
+        unit = y / top if top > _SMALLEST else y  # sums and squares of outputs near the largest float overflow
+        factor = top if top > _SMALLEST else 1.0
+        shift = factor * float(unit.mean()) if len(y) else 0.0
+        spread = 0.0 if flat else factor * float(unit.std())
         if output_range is not None:
             return cls(shift, max((output_range[1] - output_range[0]) / 4.0, spread), flat)
         return cls(shift, spread if spread > 0.0 else 1.0, flat)
+
+    @property
+    def square(self) -> float:
+        """Squared scale, by which variances are multiplied; beyond 1e150 the scale counts as 1e150."""
+        return min(self.scale, _LARGEST) ** 2
 
     def apply(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return standardized outputs."""
@@ -63,4 +72,8 @@ def checked_range(output_range: tuple[float, float] | None) -> tuple[float, floa
 
 
 def _is_flat(y: NDArray[np.float64]) -> bool:
-    return len(y) < 2 or float(np.ptp(y)) <= _FLAT * float(np.abs(y).max())
+    if len(y) < 2:
+        return True
+    top = float(np.abs(y).max())
+    half = 0.5 * float(y.max()) - 0.5 * float(y.min())  # the whole range of the largest floats overflows
+    return half <= 0.5 * max(_FLAT * top, _SMALLEST)

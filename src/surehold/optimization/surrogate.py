@@ -11,6 +11,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+_LARGEST = 1e150  # the square of a larger number is infinite
+
 __all__ = ["FitDiagnostics", "Moments", "Posterior", "Surrogate", "mixture"]
 
 
@@ -94,4 +96,5 @@ def mixture(moments: Moments) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     E[variance] + Var[mean].
     """
     mean = moments.mean.mean(axis=0)
-    return mean, moments.variance.mean(axis=0) + ((moments.mean - mean) ** 2).mean(axis=0)
+    spread = np.clip(moments.mean - mean, -_LARGEST, _LARGEST)
+    return mean, moments.variance.mean(axis=0) + (spread**2).mean(axis=0)
