@@ -143,10 +143,12 @@ def gauss_hermite(covariance: ArrayLike, order: int = 3) -> Quadrature:
     r = len(noisy)
     if isinstance(order, bool) or not isinstance(order, int) or order < 1:
         raise InputError(f"order is {order!r}; give a whole number of 1 or more.")
+    if r == 0:
+        return exact(d)
     if order**r > 10_000:
         raise InputError(f"order {order} in {r} noisy variables makes {order**r} points; use 'unscented' instead.")
     nodes, weights = np.polynomial.hermite_e.hermegauss(order)
-    grid = np.stack(np.meshgrid(*[nodes] * r, indexing="ij"), axis=-1).reshape(-1, r) if r else np.zeros((1, 0))
+    grid = np.stack(np.meshgrid(*[nodes] * r, indexing="ij"), axis=-1).reshape(-1, r)
     product = np.ones(len(grid))
     for column in np.stack(np.meshgrid(*[weights / weights.sum()] * r, indexing="ij"), axis=-1).reshape(-1, r).T:
         product = product * column
