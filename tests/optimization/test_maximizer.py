@@ -80,7 +80,10 @@ def test_direct_finds_the_higher_of_two_peaks(d):
 
 def test_reproducible():
     f = two_peaks(0.05)
-    for search in (lambda rng: multistart(f, f, 2, np.full((1, 2), 0.5), rng), lambda rng: direct(f, 2, np.full(2, 0.5), rng)):
+    for search in (
+        lambda rng: multistart(f, f, 2, np.full((1, 2), 0.5), rng),
+        lambda rng: direct(f, 2, np.full(2, 0.5), rng),
+    ):
         assert np.array_equal(search(np.random.default_rng(3)), search(np.random.default_rng(3)))
 
 

@@ -181,5 +181,6 @@ def where_to_look(
         both = posterior.average(u[None, :], np.concatenate([offsets, (point - u)[None, :]]), weights).variance
         covariance = 0.5 * (both[:, 0] - variance_g[:, 0] - variance_f[:, i])
         total = variance_f[:, i] + noise_variance
-        gain[i] = np.mean(np.divide(covariance**2, total, out=np.zeros_like(total), where=total > 0.0))
+        share = np.divide(covariance, np.sqrt(total), out=np.zeros_like(total), where=total > 0.0)
+        gain[i] = np.mean(share**2)
     return points[np.argsort(-gain, kind="stable")]

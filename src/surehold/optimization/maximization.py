@@ -107,7 +107,7 @@ def maximize(
         raise InputError(f"f is {f!r}; give a function that takes x (d,) and returns a number.")
     if isinstance(n_trials, bool) or not isinstance(n_trials, (int, np.integer)) or n_trials < 1:
         raise InputError(f"n_trials is {n_trials!r}; give a whole number of 1 or more.")
-    if settings.get("n_initial") is None:
+    if settings.get("n_initial") is None and isinstance(box, Box):
         settings["n_initial"] = min(Optimizer.default_n_initial(box), n_trials)
     optimizer = Optimizer(box, **settings)
     if optimizer.n_initial > n_trials:
