@@ -35,7 +35,9 @@ class Outcome:
     @property
     def std(self) -> float:
         """Standard deviation of the outcome, by the law of total variance."""
-        return float(np.sqrt(np.mean(self.stds**2) + self.means.var()))
+        spread = self.means - self.means.mean()
+        unit = max(float(self.stds.max()), float(np.abs(spread).max())) or 1.0  # squares may overflow
+        return unit * float(np.sqrt(np.mean((self.stds / unit) ** 2) + np.mean((spread / unit) ** 2)))
 
     def probability_below(self, value: float) -> float:
         """Return the probability that the outcome is below a value."""
@@ -105,7 +107,9 @@ def recommendation(
     outcome = outcome_of(posterior, reached, u)
     moments, _ = sigma_points.spread(posterior, u[None, :])
     means, weights = moments.mean.mean(axis=0), sigma_points.quadrature.weights
-    variance = weights @ (means - weights @ means) ** 2
+    spread = means - weights @ means
+    unit = float(np.abs(spread).max()) or 1.0  # squares may overflow
+    variance = weights @ (spread / unit) ** 2
     refused = ""
     if np.any(np.abs(highest[0] - u) > 1e-6):
         other = outcome_of(posterior, reached, highest[0])
@@ -121,7 +125,7 @@ def recommendation(
         outcome.quantile(_LEVEL),
         observed,
         n,
-        float(np.sqrt(max(variance, 0.0))),
+        unit * float(np.sqrt(max(variance, 0.0))),
         refused,
         outcome,
     )
