@@ -44,7 +44,7 @@ def expected_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, margi
     """
     mean, std = np.asarray(mean, dtype=np.float64), np.asarray(std, dtype=np.float64)
     gain = mean - np.asarray(best) - margin
-    z = gain / _floored(std, gain)
+    z = _standardized(gain, std)
     density = _density(z)
     probability = ndtr(z)
     # For z below -1 the two terms nearly cancel; the scaled complementary error function does not.
@@ -59,8 +59,8 @@ def log_expected_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, m
     log EI = log std + log h(z), h(z) = phi(z) + z Phi(z), with the asymptotic branch of Ament et al. 2023.
     """
     gain = np.asarray(mean, dtype=np.float64) - np.asarray(best) - margin
-    std = _floored(std, gain)
-    z = gain / std
+    std = np.maximum(np.asarray(std, dtype=np.float64), _SMALLEST)
+    z = _standardized(gain, std)
     # log h: below -1 the sum cancels; 1 - |z| Phi / phi by erfcx does not, nor does the ratio Phi / h = d log h / dz.
     low = z < -1.0
     z_low = np.where(low, z, -1.0)
@@ -76,8 +76,8 @@ def log_expected_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, m
 def probability_of_improvement(mean: ArrayLike, std: ArrayLike, best: ArrayLike, margin: float = 0.0) -> Value:
     """Return Phi(z), thesis table 2.1; 0 or 1 at std 0."""
     gain = np.asarray(mean, dtype=np.float64) - np.asarray(best) - margin
-    std = _floored(std, gain)
-    z = gain / std
+    std = np.maximum(np.asarray(std, dtype=np.float64), _SMALLEST)
+    z = _standardized(gain, std)
     density = _density(z)
     return Value(ndtr(z), density / std, -z * density / std)
 
@@ -88,9 +88,9 @@ def upper_confidence_bound(mean: ArrayLike, std: ArrayLike, kappa: float) -> Val
     return Value(mean + kappa * std, np.ones_like(mean), np.full_like(std, kappa))
 
 
-def _floored(std: ArrayLike, gain: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return standard deviations that keep z = gain / std and its square finite."""
-    return np.maximum(np.maximum(np.asarray(std, dtype=np.float64), _SMALLEST), np.abs(gain) / _FARTHEST)
+def _standardized(gain: NDArray[np.float64], std: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return z = gain / std, held where its square, over a small std, stays finite."""
+    return gain / np.maximum(np.maximum(std, _SMALLEST), np.abs(gain) / _FARTHEST)
 
 
 def _density(z: NDArray[np.float64]) -> NDArray[np.float64]:
