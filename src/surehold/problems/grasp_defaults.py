@@ -2,8 +2,8 @@
 
 For each object and mode the search tries standoffs s from h/3 to h + 20 mm (h the half extent of the object's box
 towards the hand) and thumb postures s1, and for each of them a grid of 15 x 7 offsets (dx, dy) over the bounds of
-`surehold.problems.Grasp`, with graded contacts. Of the pairs that leave 30 to 70 % of these poses free of collision it
-takes the one with the highest mean quality; without such a pair, the one nearest to that range.
+`surehold.problems.Grasp`, with graded contacts. Of the pairs that leave a third to two thirds of these poses free of
+collision it takes the one with the highest mean quality; without such a pair, of those nearest to that range.
 `python -m surehold.problems.grasp_defaults` repeats the search for the shipped objects and prints the table below.
 """
 
@@ -28,12 +28,12 @@ class GraspDefault(NamedTuple):
     s1: float  #: posture variable [rad]
 
 
-_FREE_SHARE: Final = (0.3, 0.7)
+_FREE_SHARE: Final = (1.0 / 3.0, 2.0 / 3.0)  # of the coarse grid: 30 to 70 % of all poses, with a margin
 _POSTURES: Final = (-1.2, -0.95, -0.7, -0.45, -0.2, 0.1)
 
 #: (object, mode) -> standoff [mm], s1 [rad]; printed by this module
 _TABLE: Final[dict[tuple[str, str], tuple[float, float]]] = {
-    ("mug", "right-front"): (18.5, -0.95),
+    ("mug", "right-front"): (23.7, -0.95),
     ("mug", "right-back"): (23.7, -0.95),
     ("mug", "right-top"): (23.7, -0.20),
     ("mug", "right-bottom"): (23.7, -0.70),
@@ -41,7 +41,7 @@ _TABLE: Final[dict[tuple[str, str], tuple[float, float]]] = {
     ("mug", "front-left"): (39.2, -0.95),
     ("mug", "front-top"): (52.3, -1.20),
     ("mug", "front-bottom"): (52.3, -1.20),
-    ("mug", "left-front"): (18.5, -0.95),
+    ("mug", "left-front"): (23.7, -0.95),
     ("mug", "left-back"): (23.7, -0.95),
     ("mug", "left-top"): (23.7, -1.20),
     ("mug", "left-bottom"): (23.7, -0.20),
@@ -52,7 +52,7 @@ _TABLE: Final[dict[tuple[str, str], tuple[float, float]]] = {
     ("mug", "top-right"): (33.1, -0.20),
     ("mug", "top-front"): (44.5, -0.70),
     ("mug", "top-left"): (33.1, -0.70),
-    ("mug", "top-back"): (27.3, -0.95),
+    ("mug", "top-back"): (33.1, -0.45),
     ("mug", "bottom-right"): (33.1, 0.10),
     ("mug", "bottom-front"): (44.5, -1.20),
     ("mug", "bottom-left"): (44.5, -1.20),
@@ -81,14 +81,14 @@ _TABLE: Final[dict[tuple[str, str], tuple[float, float]]] = {
     ("bottle", "bottom-front"): (75.6, -1.20),
     ("bottle", "bottom-left"): (75.6, -1.20),
     ("bottle", "bottom-back"): (75.6, -1.20),
-    ("glass", "right-front"): (11.8, -0.45),
-    ("glass", "front-left"): (11.8, -0.45),
-    ("glass", "left-back"): (11.8, -0.45),
-    ("glass", "back-right"): (11.8, -0.45),
-    ("glass", "right-back"): (11.8, -0.45),
-    ("glass", "back-left"): (11.8, -0.45),
-    ("glass", "left-front"): (11.8, -0.45),
-    ("glass", "front-right"): (11.8, -0.45),
+    ("glass", "right-front"): (16.7, -0.45),
+    ("glass", "front-left"): (16.7, -0.45),
+    ("glass", "left-back"): (16.7, -0.45),
+    ("glass", "back-right"): (16.7, -0.45),
+    ("glass", "right-back"): (16.7, -0.45),
+    ("glass", "back-left"): (16.7, -0.45),
+    ("glass", "left-front"): (16.7, -0.45),
+    ("glass", "front-right"): (16.7, -0.45),
     ("glass", "right-top"): (36.1, 0.10),
     ("glass", "front-top"): (36.1, 0.10),
     ("glass", "left-top"): (36.1, 0.10),
@@ -105,10 +105,10 @@ _TABLE: Final[dict[tuple[str, str], tuple[float, float]]] = {
     ("glass", "bottom-front"): (83.3, -1.20),
     ("glass", "bottom-left"): (83.3, -1.20),
     ("glass", "bottom-back"): (83.3, -1.20),
-    ("drill", "right-front"): (78.0, 0.10),
-    ("drill", "right-back"): (78.0, -1.20),
-    ("drill", "right-top"): (78.0, 0.10),
-    ("drill", "right-bottom"): (78.0, -0.20),
+    ("drill", "right-front"): (68.7, 0.10),
+    ("drill", "right-back"): (31.7, -1.20),
+    ("drill", "right-top"): (78.0, -0.20),
+    ("drill", "right-bottom"): (78.0, -0.45),
     ("drill", "front-right"): (14.4, -0.45),
     ("drill", "front-left"): (14.4, -0.95),
     ("drill", "front-top"): (14.4, -0.45),
