@@ -1,0 +1,151 @@
+"""A Gaussian process conditioned on trials, as a mixture over the particles of its hyperparameters.
+
+Legend: theta (m, p) = particles of log length-scales (d), log signal variance and log noise variance where learnt;
+outputs are standardized inside and in their own units outside.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import SureholdError
+from surehold.optimization.likelihood import Evidence
+from surehold.optimization.outputs import Standardization
+from surehold.optimization.prediction import average, factorize, sample
+from surehold.optimization.surrogate import FitDiagnostics, Moments
+
+__all__ = ["GaussianProcessPosterior", "Hyperparameters"]
+
+
+class Hyperparameters(NamedTuple):
+    """The particles, unpacked."""
+
+    theta: NDArray[np.float64]
+    """(m, p)"""
+    inverse_l: NDArray[np.float64]
+    """inverse length-scales, (m, d)"""
+    s2: NDArray[np.float64]
+    """signal variances in standardized units, (m,)"""
+    v: NDArray[np.float64]
+    """learnt noise variances in standardized units, (m,)"""
+
+
+class GaussianProcessPosterior:
+    """A Gaussian process conditioned on trials, a mixture over the particles of its hyperparameters.
+
+    Built by `GaussianProcess.condition`. `evidence` holds the trials in standardized units, `outputs` the map
+    back; `Y` (m, n) are the outputs that each particle has seen, which differ only at pending trials.
+    """
+
+    def __init__(
+        self,
+        evidence: Evidence,
+        theta: NDArray[np.float64],
+        outputs: Standardization,
+        cost: int,
+        Y: NDArray[np.float64] | None = None,
+    ):
+        m, d = len(theta), evidence.X.shape[1]
+        n = len(evidence.X)
+        self.evidence: Final = evidence
+        self.outputs: Final = outputs
+        self.hyperparameters: Final = Hyperparameters(
+            theta,
+            np.exp(-theta[:, :d]),
+            np.exp(theta[:, d]) if evidence.learn_signal else np.full(m, evidence.signal_variance),
+            np.exp(theta[:, -1]) if evidence.learn_noise else np.zeros(m),
+        )
+        self._Y: Final = np.ascontiguousarray(np.broadcast_to(evidence.y, (m, n)) if Y is None else Y)
+        self._inverse_L: Final = np.empty((m, n, n))
+        self._alpha: Final = np.empty((m, n))
+        repaired = factorize(
+            evidence.X,
+            self._Y,
+            evidence.noise,
+            self.hyperparameters.inverse_l,
+            self.hyperparameters.s2,
+            self.hyperparameters.v,
+            evidence.ratio,
+            evidence.mean_variance,
+            evidence.kernel,
+            self._inverse_L,
+            self._alpha,
+        )
+        if repaired < 0:
+            raise SureholdError("the covariance of the trials could not be factorized; are outputs of sane size?")
+        self.diagnostics: Final = FitDiagnostics(n, cost, repaired, outputs.flat)
+
+    @property
+    def length_scales(self) -> NDArray[np.float64]:
+        """Length-scales of the particles, (m, d), in widths of the unit cube."""
+        return 1.0 / self.hyperparameters.inverse_l
+
+    def average(
+        self,
+        queries: NDArray[np.float64],
+        offsets: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        gradient: bool = False,
+        slopes: NDArray[np.float64] | None = None,
+    ) -> Moments:
+        """Return the moments of sum_i weights[i] f(query + offsets[i]) for queries (q, d).
+
+        offsets are (s, d), or (q, s, d) where each query has its own; slopes, of the same shape and 1 by default, are
+        the derivatives of query + offset by the query, coordinate by coordinate.
+        """
+        shape = (-1, *offsets.shape[-2:])
+        mean, variance, mean_gradient, variance_gradient = average(
+            np.ascontiguousarray(queries),
+            np.ascontiguousarray(offsets).reshape(shape),
+            np.ascontiguousarray(np.ones_like(offsets) if slopes is None else slopes).reshape(shape),
+            np.ascontiguousarray(weights),
+            self.evidence.X,
+            self.hyperparameters.inverse_l,
+            self.hyperparameters.s2,
+            self.evidence.mean_variance,
+            self.evidence.kernel,
+            self._inverse_L,
+            self._alpha,
+            gradient,
+        )
+        scale = self.outputs.scale
+        return Moments(
+            self.outputs.shift * weights.sum() + scale * mean,
+            self.outputs.square * variance,
+            scale * mean_gradient if gradient else None,
+            self.outputs.square * variance_gradient if gradient else None,
+        )
+
+    def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
+        """Return the moments of f at queries (q, d)."""
+        return self.average(queries, np.zeros((1, queries.shape[1])), np.ones(1), gradient)
+
+    def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
+        draws = sample(
+            np.ascontiguousarray(points),
+            np.ascontiguousarray(normals),
+            self.evidence.X,
+            self.hyperparameters.inverse_l,
+            self.hyperparameters.s2,
+            self.evidence.mean_variance,
+            self.evidence.kernel,
+            self._inverse_L,
+            self._alpha,
+        )
+        return self.outputs.shift + self.outputs.scale * draws
+
+    def with_pending(self, X: NDArray[np.float64]) -> "GaussianProcessPosterior":
+        """Return the posterior as if each particle's own mean had been observed at X (k, d): only variances shrink."""
+        believed = self.outputs.apply(self.moments(X).mean)  # (m, k)
+        noise = np.full(len(X), self.evidence.noise.mean() if len(self.evidence.noise) else 0.0)
+        extended = self.evidence._replace(
+            X=np.concatenate([self.evidence.X, X]),
+            y=np.concatenate([self.evidence.y, believed.mean(axis=0)]),
+            noise=np.concatenate([self.evidence.noise, noise]),
+            offsets=np.array([0, len(self.evidence.X) + len(X)]),
+        )
+        Y = np.concatenate([self._Y, believed], axis=1)
+        theta = self.hyperparameters.theta
+        return GaussianProcessPosterior(extended, theta, self.outputs, self.diagnostics.evaluations, Y)
