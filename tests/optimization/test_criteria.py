@@ -79,6 +79,8 @@ def test_always_numbers_and_ordered(mean, std, best, more):
         value, by_mean, by_std = criterion(mean, std, best)
         assert not np.isnan([value, by_mean, by_std]).any(), criterion.__name__
         rounding = 1e-14 * abs(value)
-        assert criterion(mean + more, std, best).value >= value - rounding, f"{criterion.__name__} falls as the mean rises"
+        assert criterion(mean + more, std, best).value >= value - rounding, (
+            f"{criterion.__name__} falls as the mean rises"
+        )
     improvement = float(expected_improvement(mean, std, best).value)
     assert improvement >= max(mean - best, 0.0) - 1e-9 * max(1.0, abs(mean), abs(best))

@@ -8,7 +8,7 @@ from scipy.stats import norm
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
-from surehold.optimization.kernels import kernel_number
+from surehold.optimization.kernels import KERNELS, kernel_number
 from surehold.optimization.likelihood import (
     Evidence,
     cholesky,
@@ -94,7 +94,7 @@ def test_blocks_are_independent_and_weighted(data):
     assert abs(log_posterior(theta, blocks) - expected) < 1e-9
 
 
-@pytest.mark.parametrize("kernel", RADIAL)
+@pytest.mark.parametrize("kernel", KERNELS)
 @pytest.mark.parametrize(("signal", "inferred"), [(False, False), (True, False), (False, True), (True, True)])
 def test_gradient(kernel, signal, inferred, data):
     X, y = data

@@ -78,6 +78,20 @@ def test_never_the_same_point_twice(robust):
     assert gaps.min() > 1e-7
 
 
+def test_trials_are_not_spent_on_polishing_a_hill():
+    """Left a smooth hill, right a higher narrow peak: once the hill's top is known, trials must go elsewhere."""
+
+    def f(x):
+        return float(np.exp(-0.5 * ((x[0] - 0.1) / 0.15) ** 2) + 1.2 * np.exp(-0.5 * ((x[0] - 0.83) / 0.015) ** 2))
+
+    for seed in range(3):
+        optimizer = Optimizer(Box({"x": (0.0, 1.0)}), n_initial=5, seed=seed)
+        for _ in range(35):
+            x = optimizer.ask()
+            optimizer.tell(x, f(x))
+        assert optimizer.y.max() > 1.19
+
+
 def test_no_trial_is_wasted_on_a_constant_function():
     optimizer = run(25, f=lambda x: 1.0, seed=0)
     U = BOX.to_unit(optimizer.X)

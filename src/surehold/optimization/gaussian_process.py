@@ -27,7 +27,8 @@ class GaussianProcess:
     Parameters
     ----------
     kernel
-        "matern52" (default), "matern32" or "squared_exponential", one length-scale a dimension.
+        "matern52" (default), "matern32", "squared_exponential", or "matern52_product", the product of Matern-5/2
+        correlations of single variables; one length-scale a dimension.
     signal_variance
         Fixed signal variance; None (default) learns it. In squared standard deviations of the outputs, or in squared
         units of the outputs where `standardize` is False.
@@ -71,7 +72,7 @@ class GaussianProcess:
         kernel: str = "matern52",
         signal_variance: float | None = None,
         noise: float | Literal["none", "inferred"] = "none",
-        ratio: float = 1e-8,
+        ratio: float = 1e-10,
         standardize: bool = True,
         output_range: tuple[float, float] | None = None,
         mean_variance: float = 0.0,

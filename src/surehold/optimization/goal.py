@@ -24,6 +24,9 @@ __all__ = ["Goal"]
 
 _ANCHORS: Final = 3
 _SHORTLIST: Final = 16
+# Improvement that is worth a trial where observations are exact, in mean absolute deviations of the outputs. Without it
+# what is left of the model's variance beside the incumbent, the nugget's, draws trial after trial to the same hill.
+_WORTHWHILE: Final = 1e-3
 
 
 @dataclass(frozen=True)
@@ -111,10 +114,11 @@ class Goal:
             found = maximizer.multistart(improvement, improvement, d, anchors, rng)
             return np.concatenate([self._looks(posterior, found[0]), found])
         if self.criterion.scale == "exact":
-            accurate = coarse = self._acquisition(posterior, Perturbations(exact(d)), best)
+            least = self.margin if self.thesis or self.noisy else _WORTHWHILE * _spread(observed)
+            accurate = coarse = self._acquisition(posterior, Perturbations(exact(d)), best, least)
         else:
-            accurate = self._acquisition(posterior, self.accurate, best)
-            coarse = self._acquisition(posterior, self.coarse, best)
+            accurate = self._acquisition(posterior, self.accurate, best, self.margin)
+            coarse = self._acquisition(posterior, self.coarse, best, self.margin)
         if self.thesis:
             return maximizer.direct(accurate, d, anchors[0], rng)
         found = maximizer.multistart(accurate, coarse, d, anchors, rng)
@@ -137,8 +141,8 @@ class Goal:
         best = self.accurate.outcome(posterior, anchors[:1]).mean  # (m, 1)
         return best if self.criterion.scale == "robust" else float(best.mean()), anchors
 
-    def _acquisition(self, posterior: Posterior, perturbations: Perturbations, best: Any) -> Acquisition:
-        return Acquisition(posterior, self.criterion, perturbations, best, margin=self.margin, kappa=self.kappa)
+    def _acquisition(self, posterior: Posterior, perturbations: Perturbations, best: Any, margin: float) -> Acquisition:
+        return Acquisition(posterior, self.criterion, perturbations, best, margin=margin, kappa=self.kappa)
 
     def _looks(self, posterior: Posterior, u: NDArray[np.float64]) -> NDArray[np.float64]:
         return where_to_look(posterior, u, self.accurate, self.coarse.quadrature.offsets)
@@ -146,6 +150,10 @@ class Goal:
     def _risk(self, posterior: Posterior, best: float) -> RiskImprovement:
         # The same draws at every call: ranking must not depend on how often it was asked for.
         return RiskImprovement(posterior, self.accurate, self.risk, best, np.random.default_rng(0))
+
+
+def _spread(values: NDArray[np.float64]) -> float:
+    return float(np.abs(values - values.mean()).mean())
 
 
 def _outcomes(posterior: Posterior, perturbations: Perturbations, U: NDArray[np.float64]) -> NDArray[np.float64]:

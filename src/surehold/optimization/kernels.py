@@ -15,6 +15,10 @@ With g, every derivative that is needed has no singularity:
     Matern-3/2            c = (1 + r) exp(-r),          r = sqrt(3) rho,  g = 3 exp(-r)
     squared exponential   c = exp(-rho^2 / 2),                            g = c
 (Rasmussen and Williams 2006, section 4.2.)
+
+The product form multiplies one-dimensional Matern-5/2 correlations c_i (thesis (3.2) as printed). There g stands for c
+itself, and both derivatives take the factor h_i = g_i / c_i of their dimension besides (`along`; 1 for the others):
+    Matern-5/2, product   c = prod_i (1 + r_i + r_i^2/3) exp(-r_i),  r_i = sqrt(5) |q_i - x_i| / l_i
 """
 
 from math import sqrt
@@ -25,9 +29,10 @@ from numba import njit
 
 from surehold.errors import unknown_name
 
-__all__ = ["KERNELS", "correlation_and_factor", "cross_correlation", "kernel_number", "self_correlation"]
+__all__ = ["KERNELS", "along", "correlation_and_factor", "cross_correlation", "kernel_number", "self_correlation"]
 
-KERNELS: Final = ("matern52", "matern32", "squared_exponential")
+KERNELS: Final = ("matern52", "matern32", "squared_exponential", "matern52_product")
+_PRODUCT: Final = 3
 _SQRT3: Final = sqrt(3.0)
 _SQRT5: Final = sqrt(5.0)
 _FAR: Final = 700.0  # beyond this exponent a correlation is 0 in double precision
@@ -115,14 +120,37 @@ def _squared_distances(x, Z, inverse_l, out):
             out[j] += t * t
 
 
+@njit(cache=True, fastmath={"contract"})
+def _products(x, Z, inverse_l, out):
+    """Fill `out` (q,) with the product form's correlation of x (d,) with columns of Z (d, q)."""
+    out[:] = 1.0
+    for k in range(x.size):
+        scale = _SQRT5 * inverse_l[k]
+        for j in range(out.size):
+            r = min(abs(x[k] - Z[k, j]) * scale, _FAR)
+            out[j] *= (1.0 + r + r * r / 3.0) * _exponential(-r)
+
+
+@njit(cache=True, inline="always")
+def along(kernel, difference, scale):
+    """Return the factor h of the module's legend for one dimension: coordinates' difference, inverse length-scale."""
+    if kernel != _PRODUCT:
+        return 1.0
+    r = _SQRT5 * abs(difference) * scale
+    return 5.0 * (1.0 + r) / (3.0 + 3.0 * r + r * r)
+
+
 @njit(cache=True)
 def self_correlation(kernel, X, inverse_l, out):
     """Fill the strict lower triangle of `out` (n, n) with c(x_i, x_j) of X (n, d) and its diagonal with 1."""
     Z = np.ascontiguousarray(X.T)
     for i in range(X.shape[0]):
         row = out[i, :i]
-        _squared_distances(X[i], Z, inverse_l, row)
-        _transform(kernel, row)
+        if kernel == _PRODUCT:
+            _products(X[i], Z, inverse_l, row)
+        else:
+            _squared_distances(X[i], Z, inverse_l, row)
+            _transform(kernel, row)
         out[i, i] = 1.0
 
 
@@ -131,8 +159,11 @@ def cross_correlation(kernel, X, Q, inverse_l, out):
     """Fill `out` (n, q) with c(x_i, q_j) of X (n, d) and Q (q, d)."""
     Z = np.ascontiguousarray(Q.T)
     for i in range(X.shape[0]):
-        _squared_distances(X[i], Z, inverse_l, out[i])
-        _transform(kernel, out[i])
+        if kernel == _PRODUCT:
+            _products(X[i], Z, inverse_l, out[i])
+        else:
+            _squared_distances(X[i], Z, inverse_l, out[i])
+            _transform(kernel, out[i])
 
 
 @njit(cache=True)
@@ -140,8 +171,12 @@ def correlation_and_factor(kernel, X, Q, inverse_l, out, factor):
     """Fill `out` (n, q) with c(x_i, q_j) and `factor` (n, q) with the radial factor g of the module's legend."""
     Z = np.ascontiguousarray(Q.T)
     for i in range(X.shape[0]):
-        _squared_distances(X[i], Z, inverse_l, out[i])
-        _transform_with_factor(kernel, out[i], factor[i])
+        if kernel == _PRODUCT:
+            _products(X[i], Z, inverse_l, out[i])
+            factor[i] = out[i]
+        else:
+            _squared_distances(X[i], Z, inverse_l, out[i])
+            _transform_with_factor(kernel, out[i], factor[i])
 
 
 def correlation(kernel: str, X: np.ndarray, Q: np.ndarray, length_scales: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit, types
 from numpy.typing import NDArray
 
-from surehold.optimization.kernels import correlation_and_factor, self_correlation
+from surehold.optimization.kernels import along, correlation_and_factor, self_correlation
 
 __all__ = [
     "Evidence",
@@ -264,8 +264,9 @@ def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel,
         for j in range(i):
             w = (alpha[i] * alpha[j] - A_inverse[i, j]) * s2  # the two symmetric entries together
             for k in range(d):
-                t = (X[i, k] - X[j, k]) * inverse_l[k]
-                gradient[k] += w * factor[i, j] * t * t
+                step = X[i, k] - X[j, k]
+                t = step * inverse_l[k]
+                gradient[k] += w * factor[i, j] * along(kernel, step, inverse_l[k]) * t * t
             gradient[d] += w * C[i, j]
         w = 0.5 * (alpha[i] * alpha[i] - A_inverse[i, i])
         gradient[d] += w * s2 * (1.0 + ratio)

@@ -16,7 +16,7 @@ is f(x) itself, so one compiled function serves both.
 import numpy as np
 from numba import njit
 
-from surehold.optimization.kernels import correlation_and_factor, cross_correlation
+from surehold.optimization.kernels import along, correlation_and_factor, cross_correlation
 from surehold.optimization.likelihood import (
     cholesky,
     data_covariance,
@@ -67,10 +67,11 @@ def _weighted_sums(C, weights, out):
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _weighted_slopes(F, X, Z, slopes, weights, k, out):
+def _weighted_slopes(kernel, F, X, Z, slopes, weights, k, scale, out):
     """Fill out (n, q) with the sums over s of -weights g (z_k - x_k) slope, for radial factors F (n, q s).
 
-    Z (d, q s) are the perturbed points, slopes (d, q s) their derivatives by the query.
+    Z (d, q s) are the perturbed points, slopes (d, q s) their derivatives by the query, scale the inverse length-scale
+    of dimension k.
     """
     s = weights.size
     for a in range(out.shape[0]):
@@ -79,7 +80,8 @@ def _weighted_slopes(F, X, Z, slopes, weights, k, out):
             t = 0.0
             for w in range(s):
                 c = i * s + w
-                t -= weights[w] * F[a, c] * (Z[k, c] - x) * slopes[k, c]
+                step = Z[k, c] - x
+                t -= weights[w] * F[a, c] * along(kernel, step, scale) * step * slopes[k, c]
             out[a, i] = t
 
 
@@ -128,7 +130,8 @@ def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel
                     t = 0.0
                     for w in range(s):
                         for o in range(s):
-                            step = (xi[w, k] - xi[o, k]) * (slopes[b, w, k] - slopes[b, o, k])
+                            step = xi[w, k] - xi[o, k]
+                            step *= (slopes[b, w, k] - slopes[b, o, k]) * along(kernel, step, inverse_l[j, k])
                             t -= weights[w] * weights[o] * own_factor[w, o] * step
                     variance_gradient[j, b:, k] = s2[j] * t * inverse_l[j, k] ** 2
         if gradient:
@@ -146,7 +149,8 @@ def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel
         if gradient:
             W = np.dot(inverse_L[j].T, V)
             for k in range(d):
-                _weighted_slopes(F, X, Z, slope, s2[j] * inverse_l[j, k] ** 2 * weights, k, D)
+                scale = inverse_l[j, k]
+                _weighted_slopes(kernel, F, X, Z, slope, s2[j] * scale**2 * weights, k, scale, D)
                 for a in range(n):
                     for i in range(q):
                         mean_gradient[j, i, k] += alpha[j, a] * D[a, i]
