@@ -4,13 +4,14 @@ What is learnt is a `GaussianProcessPosterior`; the formulas of its predictions 
 """
 
 from math import log, sqrt
-from typing import Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.gaussian_process_posterior import GaussianProcessPosterior
+from surehold.optimization.heteroscedastic import most_likely_noise
 from surehold.optimization.hyperparameters import Learning, Prior, from_prior, learn
 from surehold.optimization.kernels import kernel_number
 from surehold.optimization.likelihood import Evidence
@@ -18,7 +19,11 @@ from surehold.optimization.outputs import Standardization, checked_range
 from surehold.optimization.surrogate import Posterior, mixture
 from surehold.optimization.threads import single_threaded
 
-__all__ = ["GaussianProcess"]
+__all__ = ["NOISES", "GaussianProcess", "NoiseName"]
+
+NoiseName = Literal["none", "inferred", "heteroscedastic"]
+NOISES: Final = get_args(NoiseName)
+_LOUDEST: Final = 1e100  # standard deviation of the noise, in those of the outputs; its square stays finite
 
 
 class GaussianProcess:
@@ -34,7 +39,9 @@ class GaussianProcess:
         units of the outputs where `standardize` is False.
     noise
         Standard deviation of the observation noise: "none" (default) for a function that gives the same answer
-        again, a number in the outputs' units, or "inferred".
+        again, a number in the outputs' units, "inferred" for one common standard deviation that is learnt, or
+        "heteroscedastic" for one that differs from place to place and is learnt. Known standard deviations of single
+        observations are an argument of `fit`.
     ratio
         Nugget on the diagonal of the data's covariance, as a fraction of the signal variance: what keeps it
         factorizable.
@@ -71,7 +78,7 @@ class GaussianProcess:
         *,
         kernel: str = "matern52",
         signal_variance: float | None = None,
-        noise: float | Literal["none", "inferred"] = "none",
+        noise: float | NoiseName = "none",
         ratio: float = 1e-10,
         standardize: bool = True,
         output_range: tuple[float, float] | None = None,
@@ -83,9 +90,9 @@ class GaussianProcess:
         self._kernel = kernel_number(kernel)
         self._signal_variance = None if signal_variance is None else _positive("signal_variance", signal_variance)
         if isinstance(noise, str):
-            if noise not in ("none", "inferred"):
-                raise unknown_name("observation noise", noise, ("none", "inferred", "a standard deviation"))
-        elif not (np.isfinite(noise) and noise >= 0.0):
+            if noise not in NOISES:
+                raise unknown_name("observation noise", noise, (*NOISES, "a standard deviation"))
+        elif not (np.ndim(noise) == 0 and np.isfinite(noise) and noise >= 0.0):
             raise InputError(f"observation noise is {noise!r}; give a finite standard deviation of 0 or more.")
         self._noise = noise
         self._ratio = float(ratio)
@@ -109,23 +116,25 @@ class GaussianProcess:
         y: NDArray[np.float64],
         rng: np.random.Generator,
         previous: Posterior | None = None,
+        noise: NDArray[np.float64] | None = None,
     ) -> GaussianProcessPosterior:
         """Learn the hyperparameters from X (n, d) in the unit cube and finite y (n,), n >= 1.
 
         `previous` is the posterior of the step before; its last particle starts the chain where the learning says so.
+        `noise` (n,) are known standard deviations of the observations, in the outputs' units, in place of the setting.
         """
         d = X.shape[1]
         if self._length_scales is not None and self._length_scales.shape not in ((), (1,), (d,)):
             raise InputError(f"length_scales have shape {self._length_scales.shape}; the inputs need ({d},).")
         outputs = Standardization.of(y, self._output_range) if self._standardize else Standardization.identity(y)
-        known = 0.0 if isinstance(self._noise, str) else min(self._noise / outputs.scale, 1e100) ** 2
-        learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred"
+        known = noise if noise is not None else np.full(len(y), 0.0 if isinstance(self._noise, str) else self._noise)
+        learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred" and noise is None
         prior = self._prior or Prior((log(0.2 * sqrt(d)), 1.0))
         prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise)
         evidence = Evidence(
             np.ascontiguousarray(X, dtype=np.float64),
             np.ascontiguousarray(outputs.apply(y)),
-            np.full(len(y), known),
+            np.minimum(known / outputs.scale, _LOUDEST) ** 2,
             np.array([0, len(y)]),
             np.ones(1),
             prior_mean,
@@ -141,24 +150,33 @@ class GaussianProcess:
             theta = prior_mean.copy()
             theta[:d] = np.log(np.broadcast_to(self._length_scales, (d,)))
             return GaussianProcessPosterior(evidence, theta[None, :], outputs, 0)
+        log_noise = None
+        if self._noise == "heteroscedastic" and noise is None and not outputs.flat:
+            variances, log_noise = most_likely_noise(evidence)
+            evidence = evidence._replace(noise=variances)
         if outputs.flat and self._standardize:
             learnt = from_prior(evidence, self._learning.particles, rng)
         else:
             last = previous.hyperparameters.theta[-1] if isinstance(previous, GaussianProcessPosterior) else None
             learnt = learn(evidence, self._learning, rng, last)
-        return GaussianProcessPosterior(evidence, learnt.particles, outputs, learnt.evaluations)
+        cost = learnt.evaluations
+        return GaussianProcessPosterior(evidence, learnt.particles, outputs, cost, log_noise=log_noise)
 
-    def fit(self, X: ArrayLike, y: ArrayLike, seed: int = 0) -> "GaussianProcess":
+    def fit(self, X: ArrayLike, y: ArrayLike, seed: int = 0, *, noise: ArrayLike | None = None) -> "GaussianProcess":
         """Learn from X (n, d), preferably scaled to the unit cube, and y (n,); returns itself.
+
+        `noise` (n,) are known standard deviations of the observations, in the outputs' units; they replace the setting
+        of the same name.
 
         Raises
         ------
         InputError
-            If shapes do not fit or a value is not finite.
+            If shapes do not fit, a value is not finite, or a standard deviation is negative.
         """
         inputs, outputs = checked_data(X, y)
+        known = None if noise is None else _checked_noise(noise, len(outputs))
         with single_threaded():
-            self._posterior = self.condition(inputs, outputs, np.random.default_rng(seed))
+            self._posterior = self.condition(inputs, outputs, np.random.default_rng(seed), noise=known)
         return self
 
     @property
@@ -174,6 +192,14 @@ class GaussianProcess:
         with single_threaded():
             mean, variance = mixture(self.posterior.moments(queries))
         return (mean, np.sqrt(variance)) if return_std else mean
+
+    def noise_std(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Return the standard deviation of the observation noise (q,) at X (q, d): what is known of it, or learnt.
+
+        Of known standard deviations of single observations the quadratic mean is taken.
+        """
+        queries, _ = checked_data(X, None, self.posterior.evidence.X.shape[1])
+        return np.sqrt(self.posterior.noise_variance(queries))
 
 
 def checked_data(
@@ -196,6 +222,18 @@ def checked_data(
         if not np.all(np.isfinite(values)):
             raise InputError(f"{name} holds NaN or infinity; remove those observations first.")
     return inputs, outputs
+
+
+def _checked_noise(noise: ArrayLike, n: int) -> NDArray[np.float64]:
+    try:
+        deviations = np.asarray(noise, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"noise is {noise!r}; give {n} standard deviations, one an observation.") from None
+    if deviations.shape != (n,):
+        raise InputError(f"noise has shape {deviations.shape}, but there are {n} observations; give one number each.")
+    if not np.all(np.isfinite(deviations) & (deviations >= 0.0)):
+        raise InputError("noise holds a number that is negative or not finite; give standard deviations of 0 or more.")
+    return deviations
 
 
 def _positive(name: str, value: float) -> float:

@@ -35,7 +35,8 @@ class GaussianProcessPosterior:
     """A Gaussian process conditioned on trials, a mixture over the particles of its hyperparameters.
 
     Built by `GaussianProcess.condition`. `evidence` holds the trials in standardized units, `outputs` the map
-    back; `Y` (m, n) are the outputs that each particle has seen, which differ only at pending trials.
+    back; `Y` (m, n) are the outputs that each particle has seen, which differ only at pending trials. `log_noise` is
+    the logarithm of the observation noise's variance, in standardized units, where it differs from place to place.
     """
 
     def __init__(
@@ -45,11 +46,13 @@ class GaussianProcessPosterior:
         outputs: Standardization,
         cost: int,
         Y: NDArray[np.float64] | None = None,
+        log_noise: "GaussianProcessPosterior | None" = None,
     ):
         m, d = len(theta), evidence.X.shape[1]
         n = len(evidence.X)
         self.evidence: Final = evidence
         self.outputs: Final = outputs
+        self.log_noise: Final = log_noise
         self.hyperparameters: Final = Hyperparameters(
             theta,
             np.exp(-theta[:, :d]),
@@ -139,13 +142,22 @@ class GaussianProcessPosterior:
     def with_pending(self, X: NDArray[np.float64]) -> "GaussianProcessPosterior":
         """Return the posterior as if each particle's own mean had been observed at X (k, d): only variances shrink."""
         believed = self.outputs.apply(self.moments(X).mean)  # (m, k)
-        noise = np.full(len(X), self.evidence.noise.mean() if len(self.evidence.noise) else 0.0)
         extended = self.evidence._replace(
             X=np.concatenate([self.evidence.X, X]),
             y=np.concatenate([self.evidence.y, believed.mean(axis=0)]),
-            noise=np.concatenate([self.evidence.noise, noise]),
+            noise=np.concatenate([self.evidence.noise, self._known_noise(X)]),
             offsets=np.array([0, len(self.evidence.X) + len(X)]),
         )
         Y = np.concatenate([self._Y, believed], axis=1)
         theta = self.hyperparameters.theta
-        return GaussianProcessPosterior(extended, theta, self.outputs, self.diagnostics.evaluations, Y)
+        return GaussianProcessPosterior(extended, theta, self.outputs, self.diagnostics.evaluations, Y, self.log_noise)
+
+    def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance of the observation noise (q,) at X (q, d), known or learnt, in squared outputs."""
+        return self.outputs.square * (self._known_noise(X) + self.hyperparameters.v.mean())
+
+    def _known_noise(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance (q,) at X (q, d), standardized, without what the particles have learnt."""
+        if self.log_noise is not None:
+            return np.exp(self.log_noise.moments(X).mean[0])
+        return np.full(len(X), self.evidence.noise.mean())

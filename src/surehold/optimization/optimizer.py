@@ -15,7 +15,7 @@ from surehold.optimization import quadratures
 from surehold.optimization.acquisition import criterion_name
 from surehold.optimization.box import Box
 from surehold.optimization.designs import design as initial_design
-from surehold.optimization.gaussian_process import GaussianProcess
+from surehold.optimization.gaussian_process import GaussianProcess, NoiseName
 from surehold.optimization.goal import Goal
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.presets import thesis_preset
@@ -56,7 +56,8 @@ class Optimizer:
     seed
         Non-negative integer.
     noise
-        Observation noise of "gp": "none" (default), its standard deviation in the outputs' units, or "inferred".
+        Observation noise of "gp": "none" (default), its standard deviation in the outputs' units, "inferred", or
+        "heteroscedastic" (inferred, differing from place to place).
     output_range
         (lowest, highest) value to expect, if known.
     quadrature
@@ -93,7 +94,7 @@ class Optimizer:
         n_initial: int | None = None,
         design: str = "latin_hypercube",
         seed: int = 0,
-        noise: float | Literal["none", "inferred"] = "none",
+        noise: float | NoiseName = "none",
         output_range: tuple[float, float] | None = None,
         quadrature: str | None = None,
         k: float = 1.0,
