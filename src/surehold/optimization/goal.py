@@ -24,6 +24,7 @@ __all__ = ["Goal"]
 
 _ANCHORS: Final = 3
 _SHORTLIST: Final = 16
+_PATIENCE: Final = 3
 # Improvement that is worth a trial where observations are exact, in mean absolute deviations of the outputs. Without it
 # what is left of the model's variance beside the incumbent, the nugget's, draws trial after trial to the same hill.
 _WORTHWHILE: Final = 1e-3
@@ -101,6 +102,8 @@ class Goal:
         pending : (p, d)
             Trials under way: the model takes its own mean for granted there.
         """
+        if not self.thesis and self._stalled(posterior, tried, observed):
+            return maximizer.largest_holes(np.concatenate([tried, pending]), rng)
         best, anchors = self._incumbent(posterior, tried, observed)
         if len(pending):
             posterior = posterior.with_pending(pending)
@@ -125,6 +128,20 @@ class Goal:
         if self.criterion.scale == "robust":
             found = np.concatenate([self._looks(posterior, found[0]), found])
         return found
+
+    def _stalled(self, posterior: Posterior, tried: NDArray[np.float64], observed: NDArray[np.float64]) -> bool:
+        """Tell whether this trial should insure against a wrong model.
+
+        A model that is too smooth can be sure that nothing is left to find. Where none of the last trials is the best
+        one, every third trial goes where nothing has been tried.
+        """
+        n = len(tried)
+        if n <= _PATIENCE or n % _PATIENCE != 0:
+            return False
+        if self.criterion.scale == "exact":
+            values = mixture(posterior.moments(tried))[0] if self.noisy else observed
+            return int(np.argmax(values)) < n - _PATIENCE
+        return int(self.rank(posterior, tried)[0]) < n - _PATIENCE
 
     def _incumbent(
         self, posterior: Posterior, tried: NDArray[np.float64], observed: NDArray[np.float64]

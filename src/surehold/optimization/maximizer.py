@@ -5,9 +5,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Objective", "direct", "multistart"]
+__all__ = ["Objective", "direct", "largest_holes", "multistart"]
 
 _CANDIDATES = 256
+_HOLES = 1024
 _SCALES = (0.1, 0.03, 0.01, 0.003)  # of the perturbed copies of each anchor, in box widths
 _COPIES = 8
 _STARTS = 4
@@ -79,6 +80,20 @@ def direct(
         start = np.clip(incumbent + _LOCAL_SCALE * rng.standard_normal(dimension), 0.0, 1.0)
         ascents.append(_ascend(objective, start, budget // 10))
     return _best_first(ascents)
+
+
+def largest_holes(points: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return points (c, d) of a Sobol sequence, the center of the largest empty ball first.
+
+    Empty of `points` (n, d), and not reaching beyond the cube by more than half its radius: the corners are farthest
+    from everything, and seldom where the answer is.
+    """
+    from scipy.spatial import KDTree
+    from scipy.stats import qmc
+
+    centers = qmc.Sobol(points.shape[1], rng=rng).random(_HOLES)
+    radius = np.minimum(KDTree(points).query(centers)[0], 2.0 * np.minimum(centers, 1.0 - centers).min(axis=1))
+    return centers[np.argsort(-radius, kind="stable")]
 
 
 def _best_first(ascents: list[tuple[NDArray[np.float64], float]]) -> NDArray[np.float64]:
