@@ -29,7 +29,15 @@ from numba import njit
 
 from surehold.errors import unknown_name
 
-__all__ = ["KERNELS", "along", "correlation_and_factor", "cross_correlation", "kernel_number", "self_correlation"]
+__all__ = [
+    "KERNELS",
+    "along",
+    "correlation_and_factor",
+    "cross_correlation",
+    "kernel_number",
+    "self_correlation",
+    "transposed",
+]
 
 KERNELS: Final = ("matern52", "matern32", "squared_exponential", "matern52_product")
 _PRODUCT: Final = 3
@@ -141,9 +149,19 @@ def along(kernel, difference, scale):
 
 
 @njit(cache=True)
+def transposed(A):
+    """Return A' (d, n) of A (n, d), C-contiguous; NumPy's own way takes seconds to compile."""
+    out = np.empty((A.shape[1], A.shape[0]))
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            out[k, i] = A[i, k]
+    return out
+
+
+@njit(cache=True)
 def self_correlation(kernel, X, inverse_l, out):
     """Fill the strict lower triangle of `out` (n, n) with c(x_i, x_j) of X (n, d) and its diagonal with 1."""
-    Z = np.ascontiguousarray(X.T)
+    Z = transposed(X)
     for i in range(X.shape[0]):
         row = out[i, :i]
         if kernel == _PRODUCT:
@@ -157,7 +175,7 @@ def self_correlation(kernel, X, inverse_l, out):
 @njit(cache=True)
 def cross_correlation(kernel, X, Q, inverse_l, out):
     """Fill `out` (n, q) with c(x_i, q_j) of X (n, d) and Q (q, d)."""
-    Z = np.ascontiguousarray(Q.T)
+    Z = transposed(Q)
     for i in range(X.shape[0]):
         if kernel == _PRODUCT:
             _products(X[i], Z, inverse_l, out[i])
@@ -169,11 +187,12 @@ def cross_correlation(kernel, X, Q, inverse_l, out):
 @njit(cache=True)
 def correlation_and_factor(kernel, X, Q, inverse_l, out, factor):
     """Fill `out` (n, q) with c(x_i, q_j) and `factor` (n, q) with the radial factor g of the module's legend."""
-    Z = np.ascontiguousarray(Q.T)
+    Z = transposed(Q)
     for i in range(X.shape[0]):
         if kernel == _PRODUCT:
             _products(X[i], Z, inverse_l, out[i])
-            factor[i] = out[i]
+            for j in range(out.shape[1]):
+                factor[i, j] = out[i, j]
         else:
             _squared_distances(X[i], Z, inverse_l, out[i])
             _transform_with_factor(kernel, out[i], factor[i])

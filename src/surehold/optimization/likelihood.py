@@ -126,10 +126,16 @@ def cholesky(A):
                 for k in range(start, j):
                     t += A[i, k] * A[j, k]
                 A[i, j] = (A[i, j] - t) / A[j, j]
-        below = np.ascontiguousarray(A[stop:, start:stop])
+        below = np.empty((n - stop, stop - start))
+        for i in range(stop, n):
+            for j in range(start, stop):
+                below[i - stop, j - start] = A[i, j]
         for first in range(stop, n, 4 * _PANEL):  # row slabs: only the lower triangle is updated, by matrix products
             last = min(first + 4 * _PANEL, n)
-            A[first:last, stop:last] -= np.dot(below[first - stop : last - stop], below[: last - stop].T)
+            product = np.dot(below[first - stop : last - stop], below[: last - stop].T)
+            for i in range(first, last):
+                for j in range(stop, i + 1):
+                    A[i, j] -= product[i - first, j - stop]
     return True
 
 
@@ -248,8 +254,10 @@ def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel,
     C = np.empty((n, n))
     factor = np.empty((n, n))
     correlation_and_factor(kernel, X, X, inverse_l, C, factor)
-    L = s2 * C + mean_variance
+    L = np.empty((n, n))
     for i in range(n):
+        for j in range(i):
+            L[i, j] = s2 * C[i, j] + mean_variance
         L[i, i] = s2 * (1.0 + ratio) + mean_variance + noise[i] + v
     if not cholesky(L):
         return -inf
@@ -306,8 +314,10 @@ def log_posterior_and_gradient(theta, evidence):
         if block == -inf:
             return -inf, gradient
         value += weight * block
-        full += weight * part
-    gradient[:d] = full[:d]
+        for i in range(d + 2):
+            full[i] += weight * part[i]
+    for i in range(d):
+        gradient[i] = full[i]
     position = d
     if evidence.learn_signal:
         gradient[position] = full[d]

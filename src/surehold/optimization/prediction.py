@@ -16,7 +16,7 @@ is f(x) itself, so one compiled function serves both.
 import numpy as np
 from numba import njit
 
-from surehold.optimization.kernels import along, correlation_and_factor, cross_correlation
+from surehold.optimization.kernels import along, correlation_and_factor, cross_correlation, transposed
 from surehold.optimization.likelihood import (
     cholesky,
     data_covariance,
@@ -104,7 +104,7 @@ def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel
                 points[i * s + w, k] = Q[i, k] + offsets[min(i, last), w, k]
                 if gradient:
                     slope[k, i * s + w] = slopes[min(i, last), w, k]
-    Z = np.ascontiguousarray(points.T)
+    Z = transposed(points)
     mean = np.zeros((m, q))
     variance = np.empty((m, q))
     mean_gradient = np.zeros((m, q if gradient else 0, d))
