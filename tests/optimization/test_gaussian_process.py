@@ -340,6 +340,24 @@ def test_bad_settings(options, words):
 
 
 @pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (lambda: Learning(method="mcmc"), "learning method"),
+        (lambda: Learning(start="zero"), "start"),
+        (lambda: Learning(particles=0), "particles"),
+        (lambda: Learning(burn_in=-1), "burn_in"),
+        (lambda: Learning(thin=1.5), "thin"),
+        (lambda: Learning(width=0.0), "width"),
+        (lambda: Prior((0.0, 0.0)), "log_length_scale"),
+        (lambda: Prior((0.0, 1.0), log_signal_variance=(np.nan, 1.0)), "log_signal_variance"),
+    ],
+)
+def test_bad_learning_and_priors(build, words):
+    with pytest.raises(InputError, match=words):
+        build()
+
+
+@pytest.mark.parametrize(
     ("X", "y", "words"),
     [
         ([0.1, 0.2], [1.0, 2.0], "shape"),

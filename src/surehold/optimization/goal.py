@@ -28,6 +28,7 @@ _PATIENCE: Final = 3
 # Improvement that is worth a trial where observations are exact, in mean absolute deviations of the outputs. Without it
 # what is left of the model's variance beside the incumbent, the nugget's, draws trial after trial to the same hill.
 _WORTHWHILE: Final = 1e-3
+_POLISH: Final = 3  # every third trial may go for any improvement: a smooth top is still found to many digits
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,7 @@ class Goal:
         tried: NDArray[np.float64],
         observed: NDArray[np.float64],
         pending: NDArray[np.float64],
+        failed: NDArray[np.float64],
         rng: np.random.Generator,
     ) -> NDArray[np.float64]:
         """Return points of the cube (c, d) for the next trial, best first.
@@ -101,9 +103,11 @@ class Goal:
             Inputs (n, d) that gave a value, and the values (n,).
         pending : (p, d)
             Trials under way: the model takes its own mean for granted there.
+        failed : (f, d)
+            Inputs that gave no value.
         """
-        if not self.thesis and self._stalled(posterior, tried, observed):
-            return maximizer.largest_holes(np.concatenate([tried, pending]), rng)
+        if not self.thesis and self._stalled(posterior, tried, observed, len(tried) + len(failed)):
+            return maximizer.largest_holes(np.concatenate([tried, failed, pending]), rng)
         best, anchors = self._incumbent(posterior, tried, observed)
         if len(pending):
             posterior = posterior.with_pending(pending)
@@ -117,8 +121,10 @@ class Goal:
             found = maximizer.multistart(improvement, improvement, d, anchors, rng)
             return np.concatenate([self._looks(posterior, found[0]), found])
         if self.criterion.scale == "exact":
-            least = self.margin if self.thesis or self.noisy else _WORTHWHILE * _spread(observed)
-            accurate = coarse = self._acquisition(posterior, Perturbations(exact(d)), best, least)
+            margin = self.margin
+            if not (self.thesis or self.noisy or (len(tried) + len(failed) + len(pending)) % _POLISH == 0):
+                margin = _WORTHWHILE * _spread(observed)
+            accurate = coarse = self._acquisition(posterior, Perturbations(exact(d)), best, margin)
         else:
             accurate = self._acquisition(posterior, self.accurate, best, self.margin)
             coarse = self._acquisition(posterior, self.coarse, best, self.margin)
@@ -129,14 +135,16 @@ class Goal:
             found = np.concatenate([self._looks(posterior, found[0]), found])
         return found
 
-    def _stalled(self, posterior: Posterior, tried: NDArray[np.float64], observed: NDArray[np.float64]) -> bool:
-        """Tell whether this trial should insure against a wrong model.
+    def _stalled(
+        self, posterior: Posterior, tried: NDArray[np.float64], observed: NDArray[np.float64], trials: int
+    ) -> bool:
+        """Tell whether this trial should insure against a wrong model; `trials` were told, failed ones included.
 
         A model that is too smooth can be sure that nothing is left to find. Where none of the last trials is the best
         one, every third trial goes where nothing has been tried.
         """
         n = len(tried)
-        if n <= _PATIENCE or n % _PATIENCE != 0:
+        if n <= _PATIENCE or trials % _PATIENCE != 0:
             return False
         if self.criterion.scale == "exact":
             values = mixture(posterior.moments(tried))[0] if self.noisy else observed

@@ -7,8 +7,8 @@ Legend
     s_i     expected squared error of observation i given the data: (y_i - mu_i)^2 + v_i
 
 The most likely noise is sought by alternation, after Kersting, Plagemann, Pfaff and Burgard 2007: f given r, then g
-given the squared errors. Their log squared errors are biased; here each step is one of Fisher scoring for a log-variance
-instead (Smyth 1989): the working observation g_i + s_i / r_i - 1 carries noise of variance 2.
+given the squared errors. Their log squared errors are biased; here each step is one of Fisher scoring for a log
+variance instead (Smyth 1989): the working observation g_i + s_i / r_i - 1 carries noise of variance 2.
 """
 
 from math import log, sqrt

@@ -4,13 +4,14 @@ Legend: theta (p,) = log length-scales (d), then log signal variance and log noi
 `likelihood`. Particles are m equally likely draws of theta.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import log
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.errors import InputError, unknown_name
 from surehold.optimization.likelihood import Evidence, log_posterior, log_posterior_and_gradient
 from surehold.optimization.slice_sampling import slice_sample
 
@@ -29,8 +30,16 @@ class Prior:
     """mean and standard deviation; length-scales in widths of the unit cube"""
     log_signal_variance: tuple[float, float] = (0.0, 1.5)
     """in squared standard deviations of the outputs"""
-    log_noise_variance: tuple[float, float] = (log(1e-4), 3.0)
+    log_noise_variance: tuple[float, float] = (log(1e-2), 3.0)
     """in squared standard deviations of the outputs"""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            mean, deviation = getattr(self, field.name)
+            if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
+                raise InputError(
+                    f"prior of {field.name} is ({mean}, {deviation}); give a mean and a positive deviation."
+                )
 
     def vectors(self, d: int, signal: bool, noise: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return means and standard deviations (p,) of theta."""
@@ -56,6 +65,18 @@ class Learning:
     thin: int = 1
     width: float | None = None
     start: Literal["mode", "previous"] = "mode"
+
+    def __post_init__(self) -> None:
+        if self.method not in ("slice", "map"):
+            raise unknown_name("learning method", self.method, ("slice", "map"))
+        if self.start not in ("mode", "previous"):
+            raise unknown_name("start of the chain", self.start, ("mode", "previous"))
+        for name, least in (("particles", 1), ("burn_in", 0), ("thin", 1)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+                raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
+        if self.width is not None and not (np.isfinite(self.width) and self.width > 0.0):
+            raise InputError(f"width is {self.width!r}; give a positive finite number, or None.")
 
 
 class Learnt(NamedTuple):

@@ -214,7 +214,12 @@ class Optimizer:
     def _propose(self, rng: np.random.Generator) -> NDArray[np.float64]:
         told, pending = self._trials.successful, self._trials.pending
         candidates = self._goal.candidates(
-            self._posterior(), self._trials.reached[told], self._trials.values[told], pending, rng
+            self._posterior(),
+            self._trials.reached[told],
+            self._trials.values[told],
+            pending,
+            self._trials.reached[~told],
+            rng,
         )
         if self._goal.noisy or self._goal.thesis:
             return candidates[0]
