@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from surehold.optimization.quadratures import sigma_points
     from surehold.optimization.recommendation import Recommendation
     from surehold.optimization.risk import Risk
+    from surehold.optimization.treed_gaussian_process import TreedGaussianProcess
 
 __version__ = "0.1.0"
 
@@ -30,6 +31,7 @@ __all__ = [
     "Result",
     "Risk",
     "SureholdError",
+    "TreedGaussianProcess",
     "Trial",
     "grasping",
     "maximize",
@@ -47,6 +49,7 @@ _HOMES = {
     "Risk": "optimization.risk",
     "Result": "optimization.maximization",
     "SureholdError": "errors",
+    "TreedGaussianProcess": "optimization.treed_gaussian_process",
     "Trial": "optimization.maximization",
     "maximize": "optimization.maximization",
     "sigma_points": "optimization.quadratures",

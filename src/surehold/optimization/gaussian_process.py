@@ -3,6 +3,7 @@
 What is learnt is a `GaussianProcessPosterior`; the formulas of its predictions are in `prediction`.
 """
 
+from collections.abc import Sequence
 from math import log, sqrt
 from typing import Final, Literal, get_args
 
@@ -123,10 +124,47 @@ class GaussianProcess:
         `previous` is the posterior of the step before; its last particle starts the chain where the learning says so.
         `noise` (n,) are known standard deviations of the observations, in the outputs' units, in place of the setting.
         """
+        last = previous.hyperparameters.theta[-1] if isinstance(previous, GaussianProcessPosterior) else None
+        return self.condition_on_blocks(X, y, rng, self.standardization(y), start=last, noise=noise)
+
+    def standardization(self, y: NDArray[np.float64]) -> Standardization:
+        """Return the map of outputs y (n,) to the scale on which this process learns."""
+        return Standardization.of(y, self._output_range) if self._standardize else Standardization.identity(y)
+
+    def centered(self, outputs: Standardization, y: NDArray[np.float64]) -> Standardization:
+        """Return a map with the scale of `outputs` but the mean of outputs y (n,), if this process standardizes."""
+        return outputs._replace(shift=float(y.mean()), flat=False) if self._standardize else outputs
+
+    def condition_on_blocks(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        rng: np.random.Generator,
+        outputs: Standardization,
+        *,
+        sizes: Sequence[int] | None = None,
+        weights: ArrayLike = (1.0,),
+        start: NDArray[np.float64] | None = None,
+        noise: NDArray[np.float64] | None = None,
+    ) -> GaussianProcessPosterior:
+        """Learn the hyperparameters from the weighted likelihoods of independent blocks; predict from the first one.
+
+        Parameters
+        ----------
+        X, y
+            Trials (n, d) in the unit cube and finite outputs (n,), block after block.
+        outputs
+            Map of the outputs to the scale on which is learnt.
+        sizes, weights
+            Number of trials and weight of each block; by default all trials are one block of weight 1.
+        start : (p,)
+            Last particle of the step before, or None.
+        noise : (n,)
+            Known standard deviations of the observations, in the outputs' units, in place of the setting.
+        """
         d = X.shape[1]
         if self._length_scales is not None and self._length_scales.shape not in ((), (1,), (d,)):
             raise InputError(f"length_scales have shape {self._length_scales.shape}; the inputs need ({d},).")
-        outputs = Standardization.of(y, self._output_range) if self._standardize else Standardization.identity(y)
         known = noise if noise is not None else np.full(len(y), 0.0 if isinstance(self._noise, str) else self._noise)
         learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred" and noise is None
         prior = self._prior or Prior((log(0.2 * sqrt(d)), 1.0))
@@ -135,8 +173,8 @@ class GaussianProcess:
             np.ascontiguousarray(X, dtype=np.float64),
             np.ascontiguousarray(outputs.apply(y)),
             np.minimum(known / outputs.scale, _LOUDEST) ** 2,
-            np.array([0, len(y)]),
-            np.ones(1),
+            np.cumsum([0, *([len(y)] if sizes is None else sizes)]),
+            np.array(weights, dtype=np.float64),
             prior_mean,
             prior_deviation,
             1.0 if self._signal_variance is None else self._signal_variance,
@@ -146,21 +184,22 @@ class GaussianProcess:
             learn_signal,
             learn_noise,
         )
+        log_noise = None
+        cost = 0
         if self._length_scales is not None:
             theta = prior_mean.copy()
             theta[:d] = np.log(np.broadcast_to(self._length_scales, (d,)))
-            return GaussianProcessPosterior(evidence, theta[None, :], outputs, 0)
-        log_noise = None
-        if self._noise == "heteroscedastic" and noise is None and not outputs.flat:
-            variances, log_noise = most_likely_noise(evidence)
-            evidence = evidence._replace(noise=variances)
-        if outputs.flat and self._standardize:
-            learnt = from_prior(evidence, self._learning.particles, rng)
+            particles = theta[None, :]
         else:
-            last = previous.hyperparameters.theta[-1] if isinstance(previous, GaussianProcessPosterior) else None
-            learnt = learn(evidence, self._learning, rng, last)
-        cost = learnt.evaluations
-        return GaussianProcessPosterior(evidence, learnt.particles, outputs, cost, log_noise=log_noise)
+            if self._noise == "heteroscedastic" and noise is None and not outputs.flat:
+                variances, log_noise = most_likely_noise(evidence)
+                evidence = evidence._replace(noise=variances)
+            if outputs.flat and self._standardize:
+                learnt = from_prior(evidence, self._learning.particles, rng)
+            else:
+                learnt = learn(evidence, self._learning, rng, start)
+            particles, cost = learnt
+        return GaussianProcessPosterior(evidence.first_block(), particles, outputs, cost, log_noise=log_noise)
 
     def fit(self, X: ArrayLike, y: ArrayLike, seed: int = 0, *, noise: ArrayLike | None = None) -> "GaussianProcess":
         """Learn from X (n, d), preferably scaled to the unit cube, and y (n,); returns itself.
@@ -174,7 +213,7 @@ class GaussianProcess:
             If shapes do not fit, a value is not finite, or a standard deviation is negative.
         """
         inputs, outputs = checked_data(X, y)
-        known = None if noise is None else _checked_noise(noise, len(outputs))
+        known = None if noise is None else checked_noise(noise, len(outputs))
         with single_threaded():
             self._posterior = self.condition(inputs, outputs, np.random.default_rng(seed), noise=known)
         return self
@@ -224,7 +263,7 @@ def checked_data(
     return inputs, outputs
 
 
-def _checked_noise(noise: ArrayLike, n: int) -> NDArray[np.float64]:
+def checked_noise(noise: ArrayLike, n: int) -> NDArray[np.float64]:
     try:
         deviations = np.asarray(noise, dtype=np.float64)
     except (TypeError, ValueError):

@@ -13,7 +13,7 @@ from surehold.errors import SureholdError
 from surehold.optimization.likelihood import Evidence
 from surehold.optimization.outputs import Standardization
 from surehold.optimization.prediction import average, factorize, sample
-from surehold.optimization.surrogate import FitDiagnostics, Moments
+from surehold.optimization.surrogate import FitDiagnostics, Moments, Regions
 
 __all__ = ["GaussianProcessPosterior", "Hyperparameters"]
 
@@ -78,6 +78,7 @@ class GaussianProcessPosterior:
         if repaired < 0:
             raise SureholdError("the covariance of the trials could not be factorized; are outputs of sane size?")
         self.diagnostics: Final = FitDiagnostics(n, cost, repaired, outputs.flat)
+        self.regions: Final = Regions.whole(d)
 
     @property
     def length_scales(self) -> NDArray[np.float64]:

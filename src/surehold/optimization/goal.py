@@ -77,10 +77,10 @@ class Goal:
                 Acquisition(posterior, mean, perturbations, 0.0, kappa=0.0)
                 for perturbations in (self.accurate, self.coarse)
             )
-            found = maximizer.multistart(accurate, coarse, anchors.shape[1], anchors, rng)
+            found = maximizer.multistart(accurate, coarse, anchors.shape[1], anchors, rng, posterior.regions)
         else:
             risk = self._risk(posterior, -np.inf)
-            found = maximizer.multistart(risk, risk, anchors.shape[1], anchors, rng)
+            found = maximizer.multistart(risk, risk, anchors.shape[1], anchors, rng, posterior.regions)
         candidates = np.concatenate([anchors[:1], found[:_ANCHORS]])
         return candidates[self.rank(posterior, candidates)[0]]
 
@@ -114,11 +114,11 @@ class Goal:
         d = tried.shape[1]
         if self.risk.name == "worst":
             bound = WorstCaseBound(posterior, self.accurate, self.kappa)
-            found = maximizer.multistart(bound, bound, d, anchors, rng)
+            found = maximizer.multistart(bound, bound, d, anchors, rng, posterior.regions)
             return np.concatenate([bound.weakest(found[0]), found])
         if self.risk.name != "mean":
             improvement = RiskImprovement(posterior, self.accurate, self.risk, float(best), rng)
-            found = maximizer.multistart(improvement, improvement, d, anchors, rng)
+            found = maximizer.multistart(improvement, improvement, d, anchors, rng, posterior.regions)
             return np.concatenate([self._looks(posterior, found[0]), found])
         if self.criterion.scale == "exact":
             margin = self.margin
@@ -129,8 +129,8 @@ class Goal:
             accurate = self._acquisition(posterior, self.accurate, best, self.margin)
             coarse = self._acquisition(posterior, self.coarse, best, self.margin)
         if self.thesis:
-            return maximizer.direct(accurate, d, anchors[0], rng)
-        found = maximizer.multistart(accurate, coarse, d, anchors, rng)
+            return maximizer.direct(accurate, d, anchors[0], rng, posterior.regions)
+        found = maximizer.multistart(accurate, coarse, d, anchors, rng, posterior.regions)
         if self.criterion.scale == "robust":
             found = np.concatenate([self._looks(posterior, found[0]), found])
         return found

@@ -70,6 +70,15 @@ class Evidence(NamedTuple):
     learn_noise: bool
     """whether theta ends with log v"""
 
+    def first_block(self) -> "Evidence":
+        """Return the evidence of the first block alone, with weight 1."""
+        n = int(self.offsets[1])
+        if n == len(self.y):
+            return self
+        return self._replace(
+            X=self.X[:n], y=self.y[:n], noise=self.noise[:n], offsets=np.array([0, n]), weights=np.ones(1)
+        )
+
 
 EVIDENCE_TYPE: Final = types.NamedTuple(
     (

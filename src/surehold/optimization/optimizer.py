@@ -18,7 +18,7 @@ from surehold.optimization.designs import design as initial_design
 from surehold.optimization.gaussian_process import GaussianProcess, NoiseName
 from surehold.optimization.goal import Goal
 from surehold.optimization.input_noise import InputNoise
-from surehold.optimization.presets import thesis_preset
+from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
 from surehold.optimization.recommendation import Recommendation, recommendation
 from surehold.optimization.risk import Risk
 from surehold.optimization.robustness import Perturbations
@@ -28,7 +28,7 @@ from surehold.optimization.trials import Trials, same
 
 __all__ = ["Optimizer"]
 
-SURROGATES: Final = ("gp",)
+SURROGATES: Final = ("gp", "tgp")
 
 
 class Optimizer:
@@ -44,7 +44,8 @@ class Optimizer:
     input_noise
         How far the reached input strays from the commanded one; None for inputs that are reached exactly.
     surrogate
-        "gp", or an object with the method `condition` (see `surrogate.Surrogate`).
+        "gp", "tgp" (a treed Gaussian process, for functions that are smooth here and rough there), or an object with
+        the method `condition` (see `surrogate.Surrogate`).
     criterion
         "ei", "log_ei", "pi", "ucb"; with input noise also "uei", "ulog_ei", "upi", "uucb" (the criterion averaged over
         sigma points) and "robust_ei", ... (the criterion of the averaged outcome). By default "log_ei" without and
@@ -114,10 +115,11 @@ class Optimizer:
             self._surrogate: Surrogate = surrogate
         elif surrogate not in SURROGATES:
             raise unknown_name("surrogate", surrogate, SURROGATES)
-        elif thesis is not None:
-            self._surrogate = thesis.gaussian_process()
         else:
-            self._surrogate = GaussianProcess(noise=noise, output_range=output_range)
+            default = GaussianProcess(noise=noise, output_range=output_range)
+            process = default if thesis is None else thesis.gaussian_process()
+            tree = TREED if thesis is None else TreedSettings(thesis.min_leaf, continued=True)
+            self._surrogate = process if surrogate == "gp" else tree.surrogate(process, box, input_noise, self.seed)
         if criterion is None:
             criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + (input_noise is not None)]
         name = criterion_name(criterion)

@@ -1,5 +1,6 @@
 """Outputs on a common scale: what the surrogate learns from is (y - shift) / scale."""
 
+from math import log2
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -47,6 +48,10 @@ class Standardization(NamedTuple):
         if output_range is not None:
             return cls(shift, max((output_range[1] - output_range[0]) / 4.0, spread), flat)
         return cls(shift, spread if spread > 0.0 else 1.0, flat)
+
+    def coarse(self) -> "Standardization":
+        """Return the map with its scale rounded to a power of sqrt(2): one more output seldom changes it."""
+        return self if self.scale == 1.0 else self._replace(scale=float(2.0 ** (0.5 * round(2.0 * log2(self.scale)))))
 
     @property
     def square(self) -> float:

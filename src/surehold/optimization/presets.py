@@ -5,13 +5,48 @@ a problem; plain "thesis" takes a signal variance of 1 and no bias. Chains of hy
 the next, as in the original program: a run rebuilt from its history proposes other points than the run itself.
 """
 
+from math import inf
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from surehold.errors import unknown_name
+from surehold.optimization.box import Box
 from surehold.optimization.gaussian_process import GaussianProcess
 from surehold.optimization.hyperparameters import Learning, Prior
+from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.treed_gaussian_process import TreedGaussianProcess
 
-__all__ = ["THESIS", "Thesis", "thesis_preset"]
+__all__ = ["THESIS", "TREED", "Thesis", "TreedSettings", "thesis_preset"]
+
+
+class TreedSettings(NamedTuple):
+    """Settings of the tree inside an optimizer."""
+
+    min_leaf: int
+    """smallest number of trials in a leaf"""
+    weight_power: float = inf
+    """by how much the trials of a leaf's ancestors count less"""
+    continued: bool = False
+    """whether chains continue from step to step"""
+
+    def surrogate(
+        self, process: GaussianProcess, box: Box, input_noise: InputNoise | None, seed: int
+    ) -> TreedGaussianProcess:
+        """Return the tree of such processes.
+
+        No leaf is narrower than the input noise's standard deviation, or 0.01 box widths where there is none.
+        """
+        margin = np.full(box.dimension, 0.01)
+        if input_noise is not None:
+            deviation = np.sqrt(np.diag(input_noise.unit_covariance(box)))
+            margin = np.where(deviation > 0.0, np.minimum(deviation, 0.49), margin)
+        return TreedGaussianProcess(
+            self.min_leaf, self.weight_power, process=process, margin=margin, continued=self.continued, seed=seed
+        )
+
+
+TREED: Final = TreedSettings(min_leaf=15)
 
 
 class Thesis(NamedTuple):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 _LARGEST = 1e150  # the square of a larger number is infinite
 
-__all__ = ["FitDiagnostics", "Moments", "Posterior", "Surrogate", "mixture"]
+__all__ = ["FitDiagnostics", "Moments", "PartitionSummary", "Posterior", "Regions", "Surrogate", "mixture"]
 
 
 class Moments(NamedTuple):
@@ -29,6 +29,31 @@ class Moments(NamedTuple):
     """(m, q, d)"""
 
 
+class Regions(NamedTuple):
+    """Boxes that together are the unit cube; within each the posterior is smooth, between them it may jump."""
+
+    lower: NDArray[np.float64]
+    """(r, d)"""
+    upper: NDArray[np.float64]
+    """(r, d)"""
+
+    @classmethod
+    def whole(cls, d: int) -> "Regions":
+        """Return the unit cube as one region."""
+        return cls(np.zeros((1, d)), np.ones((1, d)))
+
+
+class PartitionSummary(NamedTuple):
+    """The tree of a surrogate in short."""
+
+    leaves: int
+    """number of leaves"""
+    depth: int
+    """splits above the deepest one"""
+    first_split: tuple[int, float] | None
+    """dimension and threshold in the unit cube of the root's split; None where there is none"""
+
+
 class FitDiagnostics(NamedTuple):
     """What learning did and what it cost."""
 
@@ -40,12 +65,15 @@ class FitDiagnostics(NamedTuple):
     """factorizations that needed a larger nugget than asked for"""
     flat: bool
     """whether all outputs were equal, so that nothing could be learnt and the prior stands in"""
+    partition: PartitionSummary | None = None
+    """the tree, of a surrogate that has one"""
 
 
 class Posterior(Protocol):
     """A surrogate conditioned on trials."""
 
     diagnostics: FitDiagnostics
+    regions: Regions
 
     def average(
         self,

@@ -1,0 +1,114 @@
+"""A treed Gaussian process conditioned on trials: independent processes in the leaves of a tree.
+
+Legend
+    l         leaves, each with a Gaussian process of its own; m particles in every one
+    pattern   for one query, the leaf that owns each point of its quadrature, (s,)
+Particle j of the whole is particle j of every leaf. Leaves are independent, so the parts of a weighted sum of function
+values that fall into different leaves add up, their means and their variances alike.
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.optimization.gaussian_process_posterior import GaussianProcessPosterior
+from surehold.optimization.partition import Partition
+from surehold.optimization.surrogate import FitDiagnostics, Moments, PartitionSummary, Regions
+
+__all__ = ["TreedPosterior"]
+
+
+class TreedPosterior:
+    """Gaussian processes in the leaves of a tree. Built by `TreedGaussianProcess.condition`."""
+
+    def __init__(self, partition: Partition, leaves: tuple[GaussianProcessPosterior, ...], n: int):
+        self.partition: Final = partition
+        self.leaves: Final = leaves
+        self.regions: Final = Regions(partition.lower, partition.upper)
+        split = partition.nodes[0].split
+        self.diagnostics: Final = FitDiagnostics(
+            n,
+            sum(leaf.diagnostics.evaluations for leaf in leaves),
+            sum(leaf.diagnostics.repaired for leaf in leaves),
+            all(leaf.diagnostics.flat for leaf in leaves),
+            PartitionSummary(len(leaves), partition.depth, None if split is None else (split[0], split[1])),
+        )
+
+    def average(
+        self,
+        queries: NDArray[np.float64],
+        offsets: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        gradient: bool = False,
+        slopes: NDArray[np.float64] | None = None,
+    ) -> Moments:
+        """Return the moments of sum_i weights[i] f(query + offsets[i]) for queries (q, d).
+
+        Each perturbed point is predicted by the leaf that owns it. offsets are (s, d), or (q, s, d) where each query
+        has its own; slopes, of the same shape and 1 by default, are the derivatives of query + offset by the query,
+        coordinate by coordinate.
+        """
+        if len(self.leaves) == 1:
+            return self.leaves[0].average(queries, offsets, weights, gradient, slopes)
+        q, d = queries.shape
+        m = len(self.leaves[0].hyperparameters.theta)
+        mean, variance = np.zeros((m, q)), np.zeros((m, q))
+        by_mean, by_variance = np.zeros((m, q, d)), np.zeros((m, q, d))
+        points = queries[:, None, :] + offsets
+        for rows, leaf, columns in self._pieces(points):
+            own = offsets[columns] if offsets.ndim == 2 else offsets[rows][:, columns]
+            tilt = slopes
+            if slopes is not None:
+                tilt = slopes[columns] if slopes.ndim == 2 else slopes[rows][:, columns]
+            part = self.leaves[leaf].average(queries[rows], own, weights[columns], gradient, tilt)
+            mean[:, rows] += part.mean
+            variance[:, rows] += part.variance
+            if part.mean_gradient is not None and part.variance_gradient is not None:
+                by_mean[:, rows] += part.mean_gradient
+                by_variance[:, rows] += part.variance_gradient
+        return Moments(mean, variance, by_mean if gradient else None, by_variance if gradient else None)
+
+    def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
+        """Return the moments of f at queries (q, d)."""
+        return self.average(queries, np.zeros((1, queries.shape[1])), np.ones(1), gradient)
+
+    def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
+        m = len(self.leaves[0].hyperparameters.theta)
+        draws = np.empty((m, len(points), *normals.shape))
+        for rows, leaf, columns in self._pieces(points):
+            part = self.leaves[leaf].sample(points[rows][:, columns], normals[:, columns])
+            draws[np.ix_(np.arange(m), rows, np.arange(len(normals)), columns)] = part
+        return draws
+
+    def with_pending(self, X: NDArray[np.float64]) -> "TreedPosterior":
+        """Return the posterior as if each particle's own mean had been observed at X (k, d), in the leaf that owns it.
+
+        The tree stays as it is.
+        """
+        home = self.partition.route(X)
+        leaves = list(self.leaves)
+        for leaf in np.unique(home):
+            leaves[leaf] = leaves[leaf].with_pending(X[home == leaf])
+        return TreedPosterior(self.partition, tuple(leaves), self.diagnostics.observations)
+
+    def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance of the observation noise (q,) at X (q, d), known or learnt, in squared outputs."""
+        home = self.partition.route(X)
+        variance = np.empty(len(X))
+        for leaf in np.unique(home):
+            variance[home == leaf] = self.leaves[leaf].noise_variance(X[home == leaf])
+        return variance
+
+    def _pieces(self, points: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.intp], int, NDArray[np.intp]]]:
+        """Take points (q, s, d) apart: queries (rows) that share a pattern, a leaf of it, its points (columns)."""
+        q, s, d = points.shape
+        home = self.partition.route(points.reshape(-1, d)).reshape(q, s)
+        order = np.lexsort(home.T[::-1])
+        new = np.any(home[order[1:]] != home[order[:-1]], axis=1)
+        for rows in np.split(order, np.flatnonzero(new) + 1):
+            pattern = home[rows[0]]
+            for leaf in np.unique(pattern):
+                yield np.sort(rows), int(leaf), np.flatnonzero(pattern == leaf)
