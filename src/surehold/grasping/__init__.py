@@ -5,13 +5,18 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from surehold.grasping.closing import CLOSING_MODES
+    from surehold.grasping.contact_wrenches import contact_wrenches
     from surehold.grasping.contacts import CONTACT_MODELS, Contacts
     from surehold.grasping.distance_field import DistanceField, distance_field
+    from surehold.grasping.force_closure import force_closure, gravity_wrenches, task_quality
+    from surehold.grasping.formats import GraspFile, StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
     from surehold.grasping.grasp import QUALITIES, STATUSES, Grasp, Simulator
     from surehold.grasping.hand import Hand, icub_left_hand
+    from surehold.grasping.inscribed_ball import ball_radius
     from surehold.grasping.meshes import OBJECTS, GraspObject, shipped_object
     from surehold.grasping.poses import FACETS, MODES, Pose, default_pose
     from surehold.grasping.scene import Scene, SceneMesh, grasp_scene
+    from surehold.grasping.simox_quality import ObjectWrenchSpace, object_wrench_space, simox_quality
     from surehold.grasping.wrench_space import WrenchQuality, wrench_quality
 
 _HOMES = {
@@ -21,23 +26,36 @@ _HOMES = {
     "DistanceField": "distance_field",
     "FACETS": "poses",
     "Grasp": "grasp",
+    "GraspFile": "formats",
     "GraspObject": "meshes",
     "Hand": "hand",
     "MODES": "poses",
     "OBJECTS": "meshes",
+    "ObjectWrenchSpace": "simox_quality",
     "Pose": "poses",
     "QUALITIES": "grasp",
     "STATUSES": "grasp",
     "Scene": "scene",
     "SceneMesh": "scene",
     "Simulator": "grasp",
+    "StoredGrasp": "formats",
     "WrenchQuality": "wrench_space",
+    "ball_radius": "inscribed_ball",
+    "contact_wrenches": "contact_wrenches",
     "default_pose": "poses",
     "distance_field": "distance_field",
+    "force_closure": "force_closure",
     "grasp_scene": "scene",
+    "grasp_to_dict": "formats",
+    "gravity_wrenches": "force_closure",
     "icub_left_hand": "hand",
+    "object_wrench_space": "simox_quality",
+    "read_isaac_grasps": "formats",
     "shipped_object": "meshes",
+    "simox_quality": "simox_quality",
+    "task_quality": "force_closure",
     "wrench_quality": "wrench_space",
+    "write_isaac_grasps": "formats",
 }
 
 __all__ = [
@@ -51,19 +69,32 @@ __all__ = [
     "Contacts",
     "DistanceField",
     "Grasp",
+    "GraspFile",
     "GraspObject",
     "Hand",
+    "ObjectWrenchSpace",
     "Pose",
     "Scene",
     "SceneMesh",
     "Simulator",
+    "StoredGrasp",
     "WrenchQuality",
+    "ball_radius",
+    "contact_wrenches",
     "default_pose",
     "distance_field",
+    "force_closure",
     "grasp_scene",
+    "grasp_to_dict",
+    "gravity_wrenches",
     "icub_left_hand",
+    "object_wrench_space",
+    "read_isaac_grasps",
     "shipped_object",
+    "simox_quality",
+    "task_quality",
     "wrench_quality",
+    "write_isaac_grasps",
 ]
 
 
