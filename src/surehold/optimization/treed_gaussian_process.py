@@ -74,9 +74,6 @@ class TreedGaussianProcess:
         continued: bool = False,
         seed: int = 0,
     ):
-        for name, value, least in (("min_leaf", min_leaf, 2), ("seed", seed, 0)):
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-                raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
         if not (isinstance(weight_power, (int, float)) and weight_power >= 0.0):  # False for NaN, too
             raise InputError(f"weight_power is {weight_power!r}; give 0 or more, inf for a leaf's own trials only.")
         if process is not None and not isinstance(process, GaussianProcess):
@@ -84,11 +81,11 @@ class TreedGaussianProcess:
         self._margin = np.asarray(margin, dtype=np.float64)
         if self._margin.ndim > 1 or not np.all((self._margin >= 0.0) & (self._margin < 0.5)):
             raise InputError(f"margin is {margin!r}; give one number in [0, 0.5), or one a dimension.")
-        self._min_leaf = int(min_leaf)
+        self._min_leaf = _count("min_leaf", min_leaf, 2)
         self._weight_power = float(weight_power)
         self._process = process or GaussianProcess()
         self._continued = continued
-        self._seed = int(seed)
+        self._seed = _count("seed", seed, 0)
         self._posterior: TreedPosterior | None = None
         self._learnt: OrderedDict[bytes, GaussianProcessPosterior] = OrderedDict()
 
@@ -176,7 +173,7 @@ class TreedGaussianProcess:
         inputs, outputs = checked_data(X, y)
         known = None if noise is None else checked_noise(noise, len(outputs))
         if seed is not None and seed != self._seed:
-            self._seed = int(seed)
+            self._seed = _count("seed", seed, 0)
             self._learnt.clear()
         with single_threaded():
             self._posterior = self.condition(inputs, outputs, np.random.default_rng(self._seed), noise=known)
@@ -200,6 +197,12 @@ class TreedGaussianProcess:
         """Return the standard deviation of the observation noise (q,) at X (q, d): what is known of it, or learnt."""
         queries, _ = checked_data(X, None, self.posterior.regions.lower.shape[1])
         return np.sqrt(self.posterior.noise_variance(queries))
+
+
+def _count(name: str, value: int, least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
+    return int(value)
 
 
 def block_weights(count: int, power: float) -> NDArray[np.float64]:
