@@ -1,3 +1,4 @@
+import pkgutil
 import subprocess
 import sys
 from importlib import import_module
@@ -42,3 +43,11 @@ def test_import_is_light():
     code = f"import sys, surehold; print([m for m in {HEAVY} if m in sys.modules])"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60).stdout
     assert loaded.strip() == "[]", f"`import surehold` loads {loaded}"
+
+
+@pytest.mark.parametrize("package", ["surehold", "surehold.grasping", "surehold.problems"])
+def test_no_name_hides_behind_a_module_of_the_same_name(package):
+    """A submodule becomes an attribute of its package once anything imports it, in place of a function of that name."""
+    root = import_module(package)
+    modules = {module.name for module in pkgutil.iter_modules(root.__path__)}
+    assert not modules & (set(root.__all__) - {"grasping", "problems"})

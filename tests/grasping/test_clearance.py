@@ -3,7 +3,7 @@ import pytest
 from exact_mesh import ExactMesh, capsule_pair
 
 from surehold.grasping.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap
-from surehold.grasping.distance_field import distance_field
+from surehold.grasping.distance_field import distance_field_of
 from surehold.grasping.meshes import shipped_object
 from surehold.grasping.poses import Pose
 from surehold.grasping.solids import RoundedBox, signed_distance
@@ -12,7 +12,7 @@ from surehold.grasping.solids import RoundedBox, signed_distance
 @pytest.fixture(scope="module", params=["mug", "drill"])
 def scene(request):
     obj = shipped_object(request.param)
-    return obj, distance_field(obj)
+    return obj, distance_field_of(obj)
 
 
 def segments(obj, n, seed):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
-from surehold.grasping.distance_field import MARGIN, cache_folder, distance_field
+from surehold.grasping.distance_field import MARGIN, cache_folder, distance_field_of
 from surehold.grasping.meshes import OBJECTS, shipped_object
 from surehold.grasping.solids import signed_distance
 
@@ -12,7 +12,7 @@ from surehold.grasping.solids import signed_distance
 @pytest.mark.parametrize("name", OBJECTS)
 def test_field_is_as_exact_as_a_finger_needs(name):
     obj = shipped_object(name)
-    field = distance_field(obj)
+    field = distance_field_of(obj)
     points = obj.box_center + np.random.default_rng(0).uniform(-1.2, 1.2, (20_000, 3)) * obj.box_half_extents
     exact, gradient = signed_distance(obj.solids, points)
     error = field.distance(points) - exact
@@ -29,7 +29,7 @@ def test_field_is_as_exact_as_a_finger_needs(name):
 @pytest.mark.parametrize("name", OBJECTS)
 def test_beyond_the_grid_the_field_is_a_lower_bound(name):
     obj = shipped_object(name)
-    field = distance_field(obj)
+    field = distance_field_of(obj)
     points = obj.box_center + np.random.default_rng(0).uniform(-2.0, 2.0, (5_000, 3)) * obj.box_half_extents
     away = np.abs(points - obj.box_center) - obj.box_half_extents
     points = points[np.any(away > MARGIN + 0.001, axis=1)]
@@ -42,13 +42,13 @@ def test_field_is_cached_and_a_damaged_file_is_replaced(tmp_path, monkeypatch):
     monkeypatch.setenv("SUREHOLD_CACHE", str(tmp_path))
     assert cache_folder() == tmp_path
     bottle = shipped_object("bottle")
-    first = distance_field(bottle, 0.004)
+    first = distance_field_of(bottle, 0.004)
     (file,) = (tmp_path / "fields").iterdir()
     stamp = file.stat().st_mtime_ns
-    np.testing.assert_array_equal(distance_field(bottle, 0.004).nodes, first.nodes)
+    np.testing.assert_array_equal(distance_field_of(bottle, 0.004).nodes, first.nodes)
     assert file.stat().st_mtime_ns == stamp, "the second call reads the file"
     file.write_bytes(b"no array")
-    np.testing.assert_array_equal(distance_field(bottle, 0.004).nodes, first.nodes)
+    np.testing.assert_array_equal(distance_field_of(bottle, 0.004).nodes, first.nodes)
     assert file.stat().st_size > 1000, "the damaged file is written anew"
 
 
@@ -56,7 +56,7 @@ def test_cache_that_cannot_be_written_does_no_harm(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     monkeypatch.setenv("SUREHOLD_CACHE", str(blocked))
-    assert distance_field(shipped_object("bottle"), 0.004).nodes.shape[-1] == 4
+    assert distance_field_of(shipped_object("bottle"), 0.004).nodes.shape[-1] == 4
 
 
 def test_cache_folder_follows_xdg(tmp_path, monkeypatch):
@@ -69,12 +69,12 @@ def test_mesh_without_solids_has_the_same_field(tmp_path, monkeypatch):
     pytest.importorskip("igl")
     monkeypatch.setenv("SUREHOLD_CACHE", str(tmp_path))
     bottle = shipped_object("bottle")
-    bare = distance_field(dataclasses.replace(bottle, solids=()), 0.006)
-    exact = distance_field(bottle, 0.006)
+    bare = distance_field_of(dataclasses.replace(bottle, solids=()), 0.006)
+    exact = distance_field_of(bottle, 0.006)
     assert np.abs(bare.nodes[..., 0] - exact.nodes[..., 0]).max() < 2e-5
 
 
 @pytest.mark.parametrize("cell", [0.0, -1.0, float("nan"), 1e-5])
 def test_bad_cell_is_explained(cell):
     with pytest.raises(InputError, match="cell"):
-        distance_field(shipped_object("bottle"), cell)
+        distance_field_of(shipped_object("bottle"), cell)

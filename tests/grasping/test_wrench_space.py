@@ -6,7 +6,7 @@ from scipy.spatial import ConvexHull
 
 from surehold.errors import InputError
 from surehold.grasping import inscribed_ball as module
-from surehold.grasping.contact_wrenches import CheckedContacts, contact_wrenches, round_contacts, tangents
+from surehold.grasping.friction_cones import CheckedContacts, contact_wrenches, round_contacts, tangents
 from surehold.grasping.inscribed_ball import ball_radius, hull_volume, inscribed_ball
 from surehold.grasping.wrench_space import wrench_quality
 

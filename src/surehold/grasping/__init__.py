@@ -5,18 +5,18 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from surehold.grasping.closing import CLOSING_MODES
-    from surehold.grasping.contact_wrenches import contact_wrenches
     from surehold.grasping.contacts import CONTACT_MODELS, Contacts
-    from surehold.grasping.distance_field import DistanceField, distance_field
-    from surehold.grasping.force_closure import force_closure, gravity_wrenches, task_quality
+    from surehold.grasping.distance_field import DistanceField, distance_field_of
     from surehold.grasping.formats import GraspFile, StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
+    from surehold.grasping.friction_cones import contact_wrenches
     from surehold.grasping.grasp import QUALITIES, STATUSES, Grasp, Simulator
     from surehold.grasping.hand import Hand, icub_left_hand
     from surehold.grasping.inscribed_ball import ball_radius
+    from surehold.grasping.linear_programs import force_closure, gravity_wrenches, task_quality
     from surehold.grasping.meshes import OBJECTS, GraspObject, shipped_object
     from surehold.grasping.poses import FACETS, MODES, Pose, default_pose
     from surehold.grasping.scene import Scene, SceneMesh, grasp_scene
-    from surehold.grasping.simox_quality import ObjectWrenchSpace, object_wrench_space, simox_quality
+    from surehold.grasping.simox import ObjectWrenchSpace, object_wrench_space, simox_quality
     from surehold.grasping.wrench_space import WrenchQuality, wrench_quality
 
 _HOMES = {
@@ -31,7 +31,7 @@ _HOMES = {
     "Hand": "hand",
     "MODES": "poses",
     "OBJECTS": "meshes",
-    "ObjectWrenchSpace": "simox_quality",
+    "ObjectWrenchSpace": "simox",
     "Pose": "poses",
     "QUALITIES": "grasp",
     "STATUSES": "grasp",
@@ -41,19 +41,19 @@ _HOMES = {
     "StoredGrasp": "formats",
     "WrenchQuality": "wrench_space",
     "ball_radius": "inscribed_ball",
-    "contact_wrenches": "contact_wrenches",
+    "contact_wrenches": "friction_cones",
     "default_pose": "poses",
-    "distance_field": "distance_field",
-    "force_closure": "force_closure",
+    "distance_field_of": "distance_field",
+    "force_closure": "linear_programs",
     "grasp_scene": "scene",
     "grasp_to_dict": "formats",
-    "gravity_wrenches": "force_closure",
+    "gravity_wrenches": "linear_programs",
     "icub_left_hand": "hand",
-    "object_wrench_space": "simox_quality",
+    "object_wrench_space": "simox",
     "read_isaac_grasps": "formats",
     "shipped_object": "meshes",
-    "simox_quality": "simox_quality",
-    "task_quality": "force_closure",
+    "simox_quality": "simox",
+    "task_quality": "linear_programs",
     "wrench_quality": "wrench_space",
     "write_isaac_grasps": "formats",
 }
@@ -82,7 +82,7 @@ __all__ = [
     "ball_radius",
     "contact_wrenches",
     "default_pose",
-    "distance_field",
+    "distance_field_of",
     "force_closure",
     "grasp_scene",
     "grasp_to_dict",

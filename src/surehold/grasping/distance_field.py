@@ -26,7 +26,7 @@ from surehold.errors import InputError
 from surehold.grasping.meshes import GraspObject
 from surehold.grasping.solids import signed_distance
 
-__all__ = ["DistanceField", "cache_folder", "distance_field", "field_distance", "field_distance_gradient"]
+__all__ = ["DistanceField", "cache_folder", "distance_field_of", "field_distance", "field_distance_gradient"]
 
 CELL: Final = 0.001  #: edge of a grid cell [m]
 MARGIN: Final = 0.012  #: how far the grid reaches beyond the object: finger radius + soft-touch depth, and slack [m]
@@ -60,7 +60,7 @@ def cache_folder() -> Path:
     return (Path(shared).expanduser() if shared else Path.home() / ".cache") / "surehold"
 
 
-def distance_field(obj: GraspObject, cell: float = CELL) -> DistanceField:
+def distance_field_of(obj: GraspObject, cell: float = CELL) -> DistanceField:
     """Return the distance field of an object, from the cache folder or computed and stored there.
 
     A cache folder that cannot be written costs time at the next start and nothing else.

@@ -18,7 +18,7 @@ from surehold.grasping.contacts import (
     skin_samples,
     touch_contacts,
 )
-from surehold.grasping.distance_field import DistanceField, distance_field
+from surehold.grasping.distance_field import DistanceField, distance_field_of
 from surehold.grasping.hand import Hand, hand_named, link_name
 from surehold.grasping.meshes import GraspObject, shipped_object
 from surehold.grasping.poses import Pose
@@ -137,7 +137,7 @@ class Simulator:
             raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.005 m.")
         self.depth: Final[float] = float(depth)
         self.object_pose: Final[Pose] = Pose() if object_pose is None else object_pose
-        self.field: Final[DistanceField] = distance_field(self.object)
+        self.field: Final[DistanceField] = distance_field_of(self.object)
         self._reach: Final[Array] = self.hand.reach()
         self._samples: Final[Array] = skin_samples(self.hand)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
-from surehold.grasping.contact_wrenches import RoundContacts, finite_array
+from surehold.grasping.friction_cones import RoundContacts, finite_array
 from surehold.grasping.nearest_facet import DONE, FAILED, FLAT, OUTSIDE, SPENT, expand_nearest
 
 __all__ = ["InscribedBall", "ball_radius", "hull_volume", "inscribed_ball", "nearest_point"]

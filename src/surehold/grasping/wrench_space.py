@@ -1,6 +1,6 @@
 """Quality of a set of contacts by the convex hull of the wrenches they can apply.
 
-Notation: see contact_wrenches.py; epsilon is the radius of the largest ball about the origin inside the convex hull
+Notation: see friction_cones.py; epsilon is the radius of the largest ball about the origin inside the convex hull
 of the union of all contacts' wrenches (Ferrari and Canny 1992, L1 hull), volume that hull's volume.
 
 Continuity. epsilon = max(0, min over unit u of h(u)) with the support function h(u) = max over wrenches of u.w. It
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import unknown_name
-from surehold.grasping.contact_wrenches import (
+from surehold.grasping.friction_cones import (
     CheckedContacts,
     Convention,
     cone_edges,

@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from surehold.errors import InputError
-from surehold.grasping.contact_wrenches import contact_wrenches
-from surehold.grasping.force_closure import force_closure, gravity_wrenches, task_quality
+from surehold.grasping.friction_cones import contact_wrenches
 from surehold.grasping.inscribed_ball import ball_radius
+from surehold.grasping.linear_programs import force_closure, gravity_wrenches, task_quality
 
 
 def random_contacts(rng, c):

@@ -6,8 +6,8 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from surehold.errors import InputError
-from surehold.grasping.contact_wrenches import contact_wrenches
-from surehold.grasping.simox_quality import _hull_vertices, object_wrench_space, simox_quality
+from surehold.grasping.friction_cones import contact_wrenches
+from surehold.grasping.simox import _hull_vertices, object_wrench_space, simox_quality
 
 # Faces of a cube with corners numbered by the bits of (x, y, z); the object's number depends on the diagonals.
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
-from surehold.grasping.contact_wrenches import finite_array
+from surehold.grasping.friction_cones import finite_array
 
 __all__ = ["force_closure", "gravity_wrenches", "task_quality"]
 

@@ -1,6 +1,6 @@
 """The quality of the simulator behind the thesis ("simox"), its slips included, so that levels can be compared.
 
-Notation: see contact_wrenches.py. It differs from epsilon in these points, all as in the original program:
+Notation: see friction_cones.py. It differs from epsilon in these points, all as in the original program:
 
 - edge forces have magnitude one, eight to a cone, and every cone is 45 degrees wide (mu = 1), whatever the friction is;
 - torques are divided by half the longest side of the object's axis-aligned box, about the plain mean of the vertices;
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
-from surehold.grasping.contact_wrenches import contact_wrenches, finite_array
+from surehold.grasping.friction_cones import contact_wrenches, finite_array
 from surehold.grasping.inscribed_ball import ball_radius
 
 __all__ = ["ObjectWrenchSpace", "object_wrench_space", "simox_quality"]
