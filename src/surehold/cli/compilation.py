@@ -10,9 +10,15 @@ from rich.console import Console
 __all__ = ["announced", "warm_up"]
 
 
+_said: list[bool] = []  # holds something once the announcement has been made
+
+
 @contextmanager
 def announced(console: Console) -> Iterator[None]:
-    """Run the block; if a kernel is compiled in it, announce that before the first and report the time at the end."""
+    """Run the block; if a kernel is compiled in it, announce that before the first and report the time at the end.
+
+    Said once a process, however many blocks compile; a compilation of less than two seconds is not worth a report.
+    """
     from numba.core import event
 
     class Watcher(event.Listener):
@@ -21,15 +27,18 @@ def announced(console: Console) -> Iterator[None]:
         def on_start(self, event: Any) -> None:
             if self.started is None:
                 self.started = time.perf_counter()
-                console.print("Compiling numerical kernels, once for this installation (half a minute) ...")
+                if not _said:
+                    console.print("Compiling numerical kernels, once for this installation (half a minute) ...")
+                    _said.append(True)
 
         def on_end(self, event: Any) -> None: ...
 
     watcher = Watcher()
     with event.install_listener("numba:compile", watcher):
         yield
-    if watcher.started is not None:
-        console.print(f"Compiled and stored in {time.perf_counter() - watcher.started:.1f} s.")
+    seconds = 0.0 if watcher.started is None else time.perf_counter() - watcher.started
+    if seconds > 2.0:
+        console.print(f"Compiled and stored in {seconds:.1f} s.")
 
 
 def warm_up(problem: Any, settings: dict[str, Any]) -> None:
