@@ -1,8 +1,8 @@
 """A treed Gaussian process conditioned on trials: independent processes in the leaves of a tree.
 
 Legend
-    l         leaves, each with a Gaussian process of its own; m particles in every one
-    pattern   for one query, the leaf that owns each point of its quadrature, (s,)
+    l   leaves, each with a Gaussian process of its own; m particles in every one
+    s   points of a quadrature around each of q queries
 Particle j of the whole is particle j of every leaf. Leaves are independent, so the parts of a weighted sum of function
 values that fall into different leaves add up, their means and their variances alike.
 """
@@ -53,10 +53,14 @@ class TreedPosterior:
         if len(self.leaves) == 1:
             return self.leaves[0].average(queries, offsets, weights, gradient, slopes)
         q, d = queries.shape
+        points = queries[:, None, :] + offsets
+        if q == 1:  # a step of an ascent, most often well inside a leaf: no bookkeeping
+            home = self.partition.route(points[0])
+            if (home == home[0]).all():
+                return self.leaves[home[0]].average(queries, offsets, weights, gradient, slopes)
         m = len(self.leaves[0].hyperparameters.theta)
         mean, variance = np.zeros((m, q)), np.zeros((m, q))
         by_mean, by_variance = np.zeros((m, q, d)), np.zeros((m, q, d))
-        points = queries[:, None, :] + offsets
         for rows, leaf, columns in self._pieces(points):
             own = offsets[columns] if offsets.ndim == 2 else offsets[rows][:, columns]
             tilt = slopes
@@ -103,12 +107,14 @@ class TreedPosterior:
         return variance
 
     def _pieces(self, points: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.intp], int, NDArray[np.intp]]]:
-        """Take points (q, s, d) apart: queries (rows) that share a pattern, a leaf of it, its points (columns)."""
+        """Take points (q, s, d) apart: queries (rows) of which the same points (columns) fall into the same leaf."""
         q, s, d = points.shape
         home = self.partition.route(points.reshape(-1, d)).reshape(q, s)
-        order = np.lexsort(home.T[::-1])
-        new = np.any(home[order[1:]] != home[order[:-1]], axis=1)
-        for rows in np.split(order, np.flatnonzero(new) + 1):
-            pattern = home[rows[0]]
-            for leaf in np.unique(pattern):
-                yield np.sort(rows), int(leaf), np.flatnonzero(pattern == leaf)
+        together = home[:, :, None] == home[:, None, :]  # (q, s, s)
+        rows, first = np.nonzero(together.argmax(axis=2) == np.arange(s))  # a query's first point in each of its leaves
+        masks, leaves = together[rows, first], home[rows, first]
+        keys = np.column_stack([np.packbits(masks, axis=1), leaves[:, None].view(np.uint8).reshape(-1, 8)])
+        order = np.lexsort(keys.T)
+        new = np.any(keys[order[1:]] != keys[order[:-1]], axis=1)
+        for piece in np.split(order, np.flatnonzero(new) + 1):  # the sort is stable: rows ascend
+            yield rows[piece], int(leaves[piece[0]]), np.flatnonzero(masks[piece[0]])
