@@ -17,7 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from surehold.grasping.contact_wrenches import contact_wrenches
+from surehold.grasping.friction_cones import contact_wrenches
 from surehold.grasping.inscribed_ball import ball_radius
 from surehold.grasping.wrench_space import wrench_quality
 

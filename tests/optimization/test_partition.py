@@ -60,7 +60,7 @@ def test_leaves_hold_enough_trials_and_cover_the_cube(min_leaf):
     for leaf, lower, upper in zip(partition.leaves, partition.lower, partition.upper, strict=True):
         members = partition.nodes[leaf].members
         assert len(members) >= min_leaf
-        inside = np.all((X >= lower) & (X <= upper), axis=1)  # trials on a border belong to both sides
+        inside = np.all((lower <= X) & (upper >= X), axis=1)  # trials on a border belong to both sides
         assert np.array_equal(np.flatnonzero(inside), members)
 
 
