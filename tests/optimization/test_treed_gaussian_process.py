@@ -268,6 +268,8 @@ def test_degenerate_data(X, y):
         ({"min_leaf": 1}, "min_leaf"),
         ({"min_leaf": 2.5}, "min_leaf"),
         ({"min_leaf": True}, "min_leaf"),
+        ({"min_leaf": "auto"}, "min_leaf"),
+        ({"trees": 0}, "trees"),
         ({"weight_power": -1.0}, "weight_power"),
         ({"weight_power": np.nan}, "weight_power"),
         ({"weight_power": "inf"}, "weight_power"),
@@ -373,3 +375,65 @@ def test_sigma_points_of_a_covariance_cross_leaves():
     whole = posterior.average(query, rule.offsets, rule.weights)
     center = posterior.leaves[posterior.partition.route(query)[0]].average(query, rule.offsets, rule.weights)
     assert not np.allclose(whole.mean, center.mean)
+
+
+def test_the_evidence_splits_what_is_jagged_and_leaves_what_is_smooth():
+    X = np.random.default_rng(0).random((120, 2))
+    jagged_tree = model(min_leaf="evidence").fit(X, jagged(X)).posterior
+    smooth_tree = model(min_leaf="evidence").fit(X, np.sin(3.0 * X[:, 0]) + X[:, 1]).posterior
+    assert jagged_tree.diagnostics.partition.leaves > 1
+    assert smooth_tree.diagnostics.partition.leaves == 1
+
+
+def test_the_evidence_of_a_process_is_its_likelihood_less_what_was_fitted():
+    X, y = data(25)
+    process = GaussianProcess(length_scales=[0.3, 0.7], signal_variance=2.0, standardize=False)
+    oracle = GaussianProcessRegressor(2.0 * Matern([0.3, 0.7], nu=2.5), optimizer=None, alpha=2e-10).fit(X, y)
+    flat = norm(0.0, 1.0).logpdf(np.log([0.3, 0.7]) - np.log(0.2 * np.sqrt(2.0))).sum()  # the prior's own density
+    value = process.log_evidence(X, y, process.standardization(y))
+    assert value == pytest.approx(oracle.log_marginal_likelihood_value_ + flat, rel=1e-6)
+
+
+def largest_jumps(posterior):
+    """Return the largest step of the mean along each of 9 lines, on a net too fine for smooth changes to count."""
+    a = np.linspace(0.0, 1.0, 4001)
+    lines = [np.column_stack([a, np.full_like(a, b)]) for b in np.linspace(0.1, 0.9, 9)]
+    return np.array([np.abs(np.diff(posterior.moments(line).mean.mean(axis=0))).max() for line in lines])
+
+
+def test_several_trees_soften_the_jumps():
+    jumps = []
+    for seed in range(6):  # in one input there are no jumps: the trial on the border is shared
+        X = np.random.default_rng(seed).random((60, 2))
+        fitted = (model(trees=trees).fit(X, np.sin(9.0 * X[:, 0]) + X[:, 1]) for trees in (1, 5))
+        jumps.append([largest_jumps(tree.posterior).mean() for tree in fitted])
+    one, five = np.mean(jumps, axis=0)
+    assert one > 0.1
+    assert five < 0.75 * one
+
+
+def test_averaged_trees_are_the_particles_of_all():
+    X, y = data(60)
+    posterior = model(trees=3).fit(X, y).posterior
+    offsets, weights = quadrature()
+    queries = np.random.default_rng(7).random((6, 2))
+    averages = posterior.average(queries, offsets, weights, gradient=True)
+    assert averages.mean.shape == (9, 6)
+    for t, tree in enumerate(posterior.trees):
+        for whole, part in zip(averages, tree.average(queries, offsets, weights, gradient=True), strict=True):
+            assert np.array_equal(whole[3 * t : 3 * t + 3], part)
+    assert len({tree.diagnostics.partition.first_split for tree in posterior.trees}) > 1
+    assert posterior.sample(queries[:, None, :] + offsets, np.zeros((2, 5))).shape == (9, 6, 2, 5)
+    assert np.all(posterior.with_pending(queries[:1]).moments(queries[:1]).variance < 1e-3 * y.var())
+
+
+@pytest.mark.parametrize("settings", [{"min_leaf": "evidence"}, {"trees": 3}])
+def test_options_repeat_themselves_and_take_degenerate_data(settings):
+    X, y = data(50)
+    one, two = (model(**settings).fit(X, y).predict(X[:5], return_std=True) for _ in range(2))
+    assert np.array_equal(one, two)
+    warm = model(**settings)
+    warm.fit(X[:49], y[:49])
+    assert np.array_equal(warm.fit(X, y).predict(X[:5]), one[0])
+    for inputs, outputs in ((X[:1], y[:1]), (X, np.ones(50)), (np.full((50, 2), 0.5), y), (np.round(X), y)):
+        assert np.all(np.isfinite(model(**settings).fit(inputs, outputs).predict(X)))

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.gaussian_process_posterior import GaussianProcessPosterior
 from surehold.optimization.heteroscedastic import most_likely_noise
-from surehold.optimization.hyperparameters import Learning, Prior, from_prior, learn
+from surehold.optimization.hyperparameters import Learning, Prior, from_prior, learn, mode
 from surehold.optimization.kernels import kernel_number
-from surehold.optimization.likelihood import Evidence
+from surehold.optimization.likelihood import Evidence, log_posterior
 from surehold.optimization.outputs import Standardization, checked_range
 from surehold.optimization.surrogate import Posterior, mixture
 from surehold.optimization.threads import single_threaded
@@ -162,34 +162,11 @@ class GaussianProcess:
         noise : (n,)
             Known standard deviations of the observations, in the outputs' units, in place of the setting.
         """
-        d = X.shape[1]
-        if self._length_scales is not None and self._length_scales.shape not in ((), (1,), (d,)):
-            raise InputError(f"length_scales have shape {self._length_scales.shape}; the inputs need ({d},).")
-        known = noise if noise is not None else np.full(len(y), 0.0 if isinstance(self._noise, str) else self._noise)
-        learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred" and noise is None
-        prior = self._prior or Prior((log(0.2 * sqrt(d)), 1.0))
-        prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise)
-        evidence = Evidence(
-            np.ascontiguousarray(X, dtype=np.float64),
-            np.ascontiguousarray(outputs.apply(y)),
-            np.minimum(known / outputs.scale, _LOUDEST) ** 2,
-            np.cumsum([0, *([len(y)] if sizes is None else sizes)]),
-            np.array(weights, dtype=np.float64),
-            prior_mean,
-            prior_deviation,
-            1.0 if self._signal_variance is None else self._signal_variance,
-            self._ratio,
-            self._mean_variance,
-            self._kernel,
-            learn_signal,
-            learn_noise,
-        )
+        evidence = self._evidence(X, y, outputs, [len(y)] if sizes is None else sizes, weights, noise)
         log_noise = None
         cost = 0
         if self._length_scales is not None:
-            theta = prior_mean.copy()
-            theta[:d] = np.log(np.broadcast_to(self._length_scales, (d,)))
-            particles = theta[None, :]
+            particles = self._fixed(evidence)[None, :]
         else:
             if self._noise == "heteroscedastic" and noise is None and not outputs.flat:
                 variances, log_noise = most_likely_noise(evidence)
@@ -200,6 +177,62 @@ class GaussianProcess:
                 learnt = learn(evidence, self._learning, rng, start)
             particles, cost = learnt
         return GaussianProcessPosterior(evidence.first_block(), particles, outputs, cost, log_noise=log_noise)
+
+    def log_evidence(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        outputs: Standardization,
+        noise: NDArray[np.float64] | None = None,
+    ) -> float:
+        """Return about log p(y | X), hyperparameters integrated out: their mode's, less p/2 log n (Schwarz 1978).
+
+        Arguments as in `condition_on_blocks`.
+        """
+        evidence = self._evidence(X, y, outputs, [len(y)], (1.0,), noise)
+        if self._length_scales is not None:
+            return float(log_posterior(self._fixed(evidence), evidence))
+        theta, _ = mode(evidence)
+        return float(log_posterior(theta, evidence)) - 0.5 * theta.size * log(len(y))
+
+    def _fixed(self, evidence: Evidence) -> NDArray[np.float64]:
+        """Return the hyperparameters (p,) where length-scales are given; the others at their prior's mean."""
+        theta = evidence.prior_mean.copy()
+        d = evidence.X.shape[1]
+        theta[:d] = np.log(np.broadcast_to(np.asarray(self._length_scales), (d,)))
+        return theta
+
+    def _evidence(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        outputs: Standardization,
+        sizes: Sequence[int],
+        weights: ArrayLike,
+        noise: NDArray[np.float64] | None,
+    ) -> Evidence:
+        d = X.shape[1]
+        if self._length_scales is not None and self._length_scales.shape not in ((), (1,), (d,)):
+            raise InputError(f"length_scales have shape {self._length_scales.shape}; the inputs need ({d},).")
+        known = noise if noise is not None else np.full(len(y), 0.0 if isinstance(self._noise, str) else self._noise)
+        learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred" and noise is None
+        prior = self._prior or Prior((log(0.2 * sqrt(d)), 1.0))
+        prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise)
+        return Evidence(
+            np.ascontiguousarray(X, dtype=np.float64),
+            np.ascontiguousarray(outputs.apply(y)),
+            np.minimum(known / outputs.scale, _LOUDEST) ** 2,
+            np.cumsum([0, *sizes]),
+            np.array(weights, dtype=np.float64),
+            prior_mean,
+            prior_deviation,
+            1.0 if self._signal_variance is None else self._signal_variance,
+            self._ratio,
+            self._mean_variance,
+            self._kernel,
+            learn_signal,
+            learn_noise,
+        )
 
     def fit(self, X: ArrayLike, y: ArrayLike, seed: int = 0, *, noise: ArrayLike | None = None) -> "GaussianProcess":
         """Learn from X (n, d), preferably scaled to the unit cube, and y (n,); returns itself.

@@ -6,7 +6,7 @@ the next, as in the original program: a run rebuilt from its history proposes ot
 """
 
 from math import inf
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -23,12 +23,14 @@ __all__ = ["THESIS", "TREED", "Thesis", "TreedSettings", "thesis_preset"]
 class TreedSettings(NamedTuple):
     """Settings of the tree inside an optimizer."""
 
-    min_leaf: int
+    min_leaf: int | Literal["evidence"]
     """smallest number of trials in a leaf"""
     weight_power: float = inf
     """by how much the trials of a leaf's ancestors count less"""
     continued: bool = False
     """whether chains continue from step to step"""
+    trees: int = 1
+    """trees that are averaged"""
 
     def surrogate(
         self, process: GaussianProcess, box: Box, input_noise: InputNoise | None, seed: int
@@ -42,7 +44,13 @@ class TreedSettings(NamedTuple):
             deviation = np.sqrt(np.diag(input_noise.unit_covariance(box)))
             margin = np.where(deviation > 0.0, np.minimum(deviation, 0.49), margin)
         return TreedGaussianProcess(
-            self.min_leaf, self.weight_power, process=process, margin=margin, continued=self.continued, seed=seed
+            self.min_leaf,
+            self.weight_power,
+            process=process,
+            trees=self.trees,
+            margin=margin,
+            continued=self.continued,
+            seed=seed,
         )
 
 

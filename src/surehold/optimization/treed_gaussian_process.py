@@ -9,7 +9,7 @@ Legend (the thesis' symbols in brackets)
 from collections import OrderedDict
 from hashlib import sha256
 from math import inf
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,11 +21,13 @@ from surehold.optimization.outputs import Standardization
 from surehold.optimization.partition import Partition, grow
 from surehold.optimization.surrogate import Posterior, mixture
 from surehold.optimization.threads import single_threaded
-from surehold.optimization.treed_posterior import TreedPosterior
+from surehold.optimization.treed_posterior import AveragedTrees, TreedPosterior
 
 __all__ = ["TreedGaussianProcess"]
 
 _REMEMBERED: Final = 4096  # leaves whose learning is kept
+_SIZES: Final = (8, 10, 15, 20, 30, 50)  # smallest leaves among which the evidence chooses
+_UNDIVIDED: Final = 300  # trials up to which no split at all is among the choices: its cost grows with their cube
 _NARROWEST: Final = 0.01  # thesis: no split nearer to the border of a leaf's box than this
 
 
@@ -35,12 +37,16 @@ class TreedGaussianProcess:
     Parameters
     ----------
     min_leaf
-        Smallest number of trials in a leaf, 2 or more.
+        Smallest number of trials in a leaf, 2 or more; "evidence" takes the one of 8, 10, 15, 20, 30, 50 whose tree
+        makes the data most probable, or no split at all (considered up to 300 trials).
     weight_power
         k of thesis (3.12): by how much the trials of a leaf's ancestors count less for its hyperparameters than its
         own, 0 or more; inf (default) leaves them out.
     process
         The Gaussian process of a leaf; the default one if None.
+    trees
+        Number of trees that are averaged: beside the one of the plain gain, some whose gain weights the trials at
+        random (the Bayesian bootstrap, Rubin 1981). Softens the jumps between leaves, at that many times the cost.
     margin
         No split lies nearer to the border of a box than this, in widths of the unit cube: one number or one a
         dimension (d,). Under input noise, its standard deviation.
@@ -66,10 +72,11 @@ class TreedGaussianProcess:
 
     def __init__(
         self,
-        min_leaf: int = 15,
+        min_leaf: int | Literal["evidence"] = 15,
         weight_power: float = inf,
         *,
         process: GaussianProcess | None = None,
+        trees: int = 1,
         margin: ArrayLike = _NARROWEST,
         continued: bool = False,
         seed: int = 0,
@@ -81,13 +88,15 @@ class TreedGaussianProcess:
         self._margin = np.asarray(margin, dtype=np.float64)
         if self._margin.ndim > 1 or not np.all((self._margin >= 0.0) & (self._margin < 0.5)):
             raise InputError(f"margin is {margin!r}; give one number in [0, 0.5), or one a dimension.")
-        self._min_leaf = _count("min_leaf", min_leaf, 2)
+        self._min_leaf = min_leaf if min_leaf == "evidence" else _count("min_leaf", min_leaf, 2)
+        self._trees = _count("trees", trees, 1)
         self._weight_power = float(weight_power)
         self._process = process or GaussianProcess()
         self._continued = continued
         self._seed = _count("seed", seed, 0)
-        self._posterior: TreedPosterior | None = None
+        self._posterior: TreedPosterior | AveragedTrees | None = None
         self._learnt: OrderedDict[bytes, GaussianProcessPosterior] = OrderedDict()
+        self._evidences: OrderedDict[bytes, float] = OrderedDict()
 
     def condition(
         self,
@@ -96,7 +105,7 @@ class TreedGaussianProcess:
         rng: np.random.Generator,
         previous: Posterior | None = None,
         noise: NDArray[np.float64] | None = None,
-    ) -> TreedPosterior:
+    ) -> TreedPosterior | AveragedTrees:
         """Grow the tree and learn its leaves from X (n, d) in the unit cube and finite y (n,), n >= 1.
 
         `previous` is the posterior of the step before, looked at where chains continue. `noise` (n,) are known
@@ -105,14 +114,74 @@ class TreedGaussianProcess:
         d = X.shape[1]
         if self._margin.shape not in ((), (1,), (d,)):
             raise InputError(f"margin has shape {self._margin.shape}; the inputs need ({d},) or one number.")
+        margin = np.broadcast_to(self._margin, (d,)).copy()
+        old = previous.trees if isinstance(previous, AveragedTrees) else (previous,) * self._trees
+        trees = []
+        for t in range(self._trees):
+            # One stream a tree: the weights of earlier trials do not change when another one is told.
+            weights = None if t == 0 else np.random.default_rng([self._seed, t]).exponential(size=len(y))
+            partition = self._partition(X, y, noise, margin, weights)
+            trees.append(self._tree(partition, X, y, rng, old[t], noise))
+        return trees[0] if self._trees == 1 else AveragedTrees(tuple(trees))
+
+    def _partition(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        noise: NDArray[np.float64] | None,
+        margin: NDArray[np.float64],
+        weights: NDArray[np.float64] | None,
+    ) -> Partition:
         outputs = self._process.standardization(y)
-        partition = grow(X, outputs.apply(y), self._min_leaf, np.broadcast_to(self._margin, (d,)).copy())
+        standardized = outputs.apply(y)
+        if not isinstance(self._min_leaf, str):
+            return grow(X, standardized, self._min_leaf, margin, weights)
+        sizes = [*_SIZES, len(y) + 1] if len(y) <= _UNDIVIDED else _SIZES
+        partitions = [grow(X, standardized, size, margin, weights) for size in sizes]
+        values = [self._log_evidence(partition, X, y, noise, outputs.coarse()) for partition in partitions]
+        return partitions[int(np.argmax(values))]
+
+    def _log_evidence(
+        self,
+        partition: Partition,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        noise: NDArray[np.float64] | None,
+        outputs: Standardization,
+    ) -> float:
+        """Return about log p(y | X, tree), each trial counted in the leaf that owns it."""
+        home = partition.route(X)
+        total = 0.0
+        for j in range(len(partition.leaves)):
+            own = np.flatnonzero(home == j)
+            if len(own) == 0:  # all its trials lie on a border that belongs to another leaf
+                continue
+            scaled = self._process.centered(outputs, y[own])
+            known = None if noise is None else noise[own]
+            key = _fingerprint(X[own], y[own], known, scaled, [own])
+            if key not in self._evidences:
+                self._evidences[key] = self._process.log_evidence(X[own], y[own], scaled, known)
+            self._evidences.move_to_end(key)
+            total += self._evidences[key]
+        while len(self._evidences) > _REMEMBERED:
+            self._evidences.popitem(last=False)
+        return total
+
+    def _tree(
+        self,
+        partition: Partition,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        rng: np.random.Generator,
+        previous: Posterior | None,
+        noise: NDArray[np.float64] | None,
+    ) -> TreedPosterior:
         old = previous if isinstance(previous, TreedPosterior) else None
         count = len(partition.leaves)
         if count == 1:
-            leaf = self._process.condition(X, y, rng, None if old is None else old.leaves[_nearest(partition, 0, old)])
-            return TreedPosterior(partition, (leaf,), len(y))
-        outputs = outputs.coarse()
+            before = None if old is None else old.leaves[_nearest(partition, 0, old)]
+            return TreedPosterior(partition, (self._process.condition(X, y, rng, before, noise),), len(y))
+        outputs = self._process.standardization(y).coarse()
         leaves = tuple(self._leaf(j, partition, X, y, noise, outputs, rng, old) for j in range(count))
         return TreedPosterior(partition, leaves, len(y))
 
@@ -180,7 +249,7 @@ class TreedGaussianProcess:
         return self
 
     @property
-    def posterior(self) -> TreedPosterior:
+    def posterior(self) -> TreedPosterior | AveragedTrees:
         """What `fit` has learnt."""
         if self._posterior is None:
             raise InputError("this TreedGaussianProcess has seen no data; call fit(X, y) first.")

@@ -17,7 +17,7 @@ from surehold.optimization.gaussian_process_posterior import GaussianProcessPost
 from surehold.optimization.partition import Partition
 from surehold.optimization.surrogate import FitDiagnostics, Moments, PartitionSummary, Regions
 
-__all__ = ["TreedPosterior"]
+__all__ = ["AveragedTrees", "TreedPosterior"]
 
 
 class TreedPosterior:
@@ -118,3 +118,51 @@ class TreedPosterior:
         new = np.any(keys[order[1:]] != keys[order[:-1]], axis=1)
         for piece in np.split(order, np.flatnonzero(new) + 1):  # the sort is stable: rows ascend
             yield rows[piece], int(leaves[piece[0]]), np.flatnonzero(masks[piece[0]])
+
+
+class AveragedTrees:
+    """Several treed posteriors, equally likely: the jumps at the borders of one tree are softened by the others."""
+
+    def __init__(self, trees: tuple[TreedPosterior, ...]):
+        self.trees: Final = trees
+        self.regions: Final = trees[0].regions  # of the tree that is not randomized; the others jump elsewhere, by less
+        parts = [tree.diagnostics for tree in trees]
+        self.diagnostics: Final = parts[0]._replace(
+            evaluations=sum(part.evaluations for part in parts), repaired=sum(part.repaired for part in parts)
+        )
+
+    def average(
+        self,
+        queries: NDArray[np.float64],
+        offsets: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        gradient: bool = False,
+        slopes: NDArray[np.float64] | None = None,
+    ) -> Moments:
+        """Return the moments of sum_i weights[i] f(query + offsets[i]), the particles of tree after tree.
+
+        Arguments as in `TreedPosterior.average`.
+        """
+        parts = [tree.average(queries, offsets, weights, gradient, slopes) for tree in self.trees]
+        mean = np.concatenate([part.mean for part in parts])
+        variance = np.concatenate([part.variance for part in parts])
+        if not gradient:
+            return Moments(mean, variance, None, None)
+        by_mean, by_variance = (np.concatenate([np.asarray(part[i]) for part in parts]) for i in (2, 3))
+        return Moments(mean, variance, by_mean, by_variance)
+
+    def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
+        """Return the moments of f at queries (q, d)."""
+        return self.average(queries, np.zeros((1, queries.shape[1])), np.ones(1), gradient)
+
+    def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
+        return np.concatenate([tree.sample(points, normals) for tree in self.trees])
+
+    def with_pending(self, X: NDArray[np.float64]) -> "AveragedTrees":
+        """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
+        return AveragedTrees(tuple(tree.with_pending(X) for tree in self.trees))
+
+    def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance of the observation noise (q,) at X (q, d), known or learnt, in squared outputs."""
+        return np.mean([tree.noise_variance(X) for tree in self.trees], axis=0)
