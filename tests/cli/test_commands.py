@@ -1,4 +1,5 @@
 import json
+import signal
 import subprocess
 import sys
 
@@ -136,6 +137,15 @@ def test_all_trials_failed(capsys):
     assert "no robot here" in error
 
 
+@pytest.fixture
+def interruptible():
+    """Python's own reaction to Ctrl-C, which a test run started in the background of a shell is started without."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_interrupt_keeps_what_was_done(here, capsys):
     assert surehold("maximize own.py:stopped --bounds a=0:1 --trials 30 --initial 6") == 0
     assert "Interrupted after 8 of 30 trials" in capsys.readouterr().out
@@ -146,6 +156,7 @@ def test_interrupt_keeps_what_was_done(here, capsys):
     assert "was interrupted after 8" in (folder / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_interrupt_before_anything(capsys):
     assert surehold("maximize own.py:stopped_at_once --bounds a=0:1") == 130
     assert "nothing to keep" in capsys.readouterr().err
