@@ -9,9 +9,8 @@ A split lies at a trial, and the trials on it belong to both children, so that t
 exceeds |A| by their number, and the gain of a useless split is negative.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -165,7 +164,6 @@ def grow(
     min_leaf: int,
     margin: NDArray[np.float64],
     weights: NDArray[np.float64] | None = None,
-    accept: Callable[[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]], float] | None = None,
 ) -> Partition:
     """Split the unit cube greedily at the highest gain, while it is positive.
 
@@ -179,9 +177,6 @@ def grow(
         No threshold lies nearer to the border of its box than this.
     weights : (n,)
         Of the trials in the uncertainty; 1 by default.
-    accept
-        Merit of splitting trials into a lower and an upper part, in place of the sign of the gain: the best of the
-        candidates with the highest gain is taken if its merit is positive.
     """
     n, d = X.shape
     shares = np.ones(n) if weights is None else weights
@@ -193,7 +188,7 @@ def grow(
         position = len(nodes)
         if parent >= 0:
             children[parent][side] = position
-        split = _best_split(X, y, shares, orders, min_leaf, lower, upper, margin, accept)
+        split = _best_split(X, y, shares, orders, min_leaf, lower, upper, margin)
         nodes.append(Node(lower, upper, np.sort(orders[0]), depth, parent, split, (-1, -1)))
         children.append([-1, -1])
         if split is None:
@@ -209,31 +204,24 @@ def grow(
     return _partition(nodes, children)
 
 
-_SHORTLIST: Final = 8  # candidates of a split whose merit is computed
-
-
-def _best_split(X, y, weights, orders, min_leaf, lower, upper, margin, accept) -> Split | None:
+def _best_split(
+    X: NDArray[np.float64],
+    y: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    orders: NDArray[np.intp],
+    min_leaf: int,
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    margin: NDArray[np.float64],
+) -> Split | None:
     d, n = orders.shape
     if n < min_leaf + 1:
         return None
     gains = np.empty((d, n))
     _gains(np.ascontiguousarray(orders), X, y, weights, min_leaf, lower, upper, margin, gains)
-    if accept is None:
-        best = int(np.argmax(gains))
-        i, k = divmod(best, n)
-        gain = float(gains[i, k])
-        return Split(i, float(X[orders[i, k], i]), gain) if gain > 0.0 else None
-    found: tuple[float, Split] | None = None
-    for best in np.argsort(-gains, axis=None, kind="stable")[:_SHORTLIST]:
-        i, k = divmod(int(best), n)
-        tau, gain = float(X[orders[i, k], i]), float(gains[i, k])
-        if gain == -np.inf:
-            break
-        members = np.sort(orders[0])
-        merit = accept(members, members[X[members, i] <= tau], members[X[members, i] >= tau])
-        if merit > 0.0 and (found is None or merit > found[0]):
-            found = merit, Split(i, tau, gain)
-    return None if found is None else found[1]
+    i, k = divmod(int(np.argmax(gains)), n)
+    gain = float(gains[i, k])
+    return Split(i, float(X[orders[i, k], i]), gain) if gain > 0.0 else None
 
 
 def _partition(nodes: list[Node], children: list[list[int]]) -> Partition:
