@@ -18,6 +18,7 @@ from surehold.optimization.designs import design as initial_design
 from surehold.optimization.gaussian_process import GaussianProcess, NoiseName
 from surehold.optimization.goal import Goal
 from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.lattice import Lattice, LatticePosterior
 from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
 from surehold.optimization.recommendation import Recommendation, recommendation
 from surehold.optimization.risk import Risk
@@ -78,6 +79,8 @@ class Optimizer:
     preset
         "thesis", or "thesis-rkhs", "thesis-gf", "thesis-gm", "thesis-gm-noise", "thesis-grasp": the settings of the
         thesis, with the constants that it chose by hand for that problem.
+    lattice
+        Which points can be tried, where not all of the box can; see `lattice.Lattice`.
 
     Raises
     ------
@@ -103,6 +106,7 @@ class Optimizer:
         kappa: float = 2.0,
         risk: str | Risk = "mean",
         preset: str | None = None,
+        lattice: Lattice | None = None,
     ):
         if not isinstance(box, Box):
             raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
@@ -142,6 +146,7 @@ class Optimizer:
             noisy=noise != "none" and noise != 0.0,
             thesis=thesis is not None,
         )
+        self._lattice = lattice
         rng = np.random.default_rng([self.seed, 0])
         self._design = initial_design(design, self.n_initial, box.dimension, rng)
         self._trials = Trials(box)
@@ -190,19 +195,41 @@ class Optimizer:
         """Drop a pending trial at x (d,) that will never be told; raises InputError if it is not pending."""
         self._trials.forget(x)
 
+    def restore(
+        self, X: ArrayLike, y: ArrayLike, *, reached: ArrayLike | None = None, pending: ArrayLike | None = None
+    ) -> None:
+        """Replace all trials by stored ones: X (t, d) with values y (t,), NaN for failed ones, and pending (p, d).
+
+        `reached` (t, d) are the inputs that were truly reached, X where None. What is asked next is what an optimizer
+        asks that was told these trials in this order.
+
+        Raises
+        ------
+        InputError
+            If shapes do not fit, an input is not finite or lies outside the box, or a value is infinite.
+        """
+        trials = Trials(self.box)
+        trials.restore(X, y, X if reached is None else reached, () if pending is None else pending)
+        if not trials.equal(self._trials):
+            self._cache = None
+        self._trials = trials
+
     # --- ask ----------------------------------------------------------------------------------------------------
 
-    def ask(self, n: int | None = None) -> NDArray[np.float64]:
+    def ask(self, n: int | None = None, *, number: int | None = None) -> NDArray[np.float64]:
         """Return the next trial (d,), or the next n trials (n, d) for parallel execution, in the box's units.
 
         Points asked for are pending until they are told: further asks keep away from them.
-        """
-        if n is None:
-            return self._ask_one()
-        return np.array([self._ask_one() for _ in range(_count("n", n, 1))])
 
-    def _ask_one(self) -> NDArray[np.float64]:
-        position = len(self._trials) + len(self._trials.pending)
+        `number` is the number of the (first) trial asked for, 0 for the first of all: its place in the initial design
+        and in the random sequence. By default as many as are told or pending.
+        """
+        first = len(self._trials) + len(self._trials.pending) if number is None else _count("number", number, 0)
+        if n is None:
+            return self._ask_one(first)
+        return np.array([self._ask_one(first + i) for i in range(_count("n", n, 1))])
+
+    def _ask_one(self, position: int) -> NDArray[np.float64]:
         if position < self.n_initial:
             u = self._design[position]
         elif not self._trials.successful.any():
@@ -210,6 +237,7 @@ class Optimizer:
         else:
             with single_threaded():
                 u = self._propose(self._rng(2, position))
+        u = self._snapped(u)
         self._trials.ask(u)
         return self.box.from_unit(u)
 
@@ -223,6 +251,7 @@ class Optimizer:
             self._trials.reached[~told],
             rng,
         )
+        candidates = self._snapped(candidates)
         if self._goal.noisy or self._goal.thesis:
             return candidates[0]
         tried = np.concatenate([self._trials.commanded, pending])
@@ -256,7 +285,7 @@ class Optimizer:
                 index = int(self._goal.rank(posterior, tried, values)[0])
                 u, observed = tried[index], float(values[index])
             else:
-                u, observed = self._goal.best(posterior, tried, self._rng(3, len(self._trials))), np.nan
+                u, observed = self._snapped(self._goal.best(posterior, tried, self._rng(3, len(self._trials)))), np.nan
             reached = Perturbations(quadratures.quasi_monte_carlo(self._covariance, 7), self._goal.accurate.border)
             highest = int(np.argmax(values))
             return recommendation(
@@ -297,8 +326,13 @@ class Optimizer:
             return self._cache[1]
         previous = self._cache[1] if self._goal.thesis and self._cache is not None else None
         posterior = self._surrogate.condition(self._trials.reached, self._trials.modelled, self._rng(1, t), previous)
+        if self._lattice is not None:
+            posterior = LatticePosterior(posterior, self._lattice)
         self._cache = (t, posterior)
         return posterior
+
+    def _snapped(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        return U if self._lattice is None else self._lattice.snap(U)
 
     def _rng(self, purpose: int, position: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, purpose, position])

@@ -84,6 +84,30 @@ class Trials:
         if index is not None:
             del self._pending[index]
 
+    def restore(self, X: ArrayLike, y: ArrayLike, reached: ArrayLike, pending: ArrayLike) -> None:
+        """Take over stored trials; see `Optimizer.restore`. Nothing is taken over where an argument is bad."""
+        commanded, actual, waiting = (
+            self._all_inside(name, points) for name, points in (("X", X), ("reached", reached), ("pending", pending))
+        )
+        values = np.asarray(y, dtype=np.float64)
+        if values.shape != (len(commanded),) or len(actual) != len(commanded):
+            raise InputError(
+                f"y has shape {values.shape} and reached {len(actual)} rows, but X has {len(commanded)} rows; give one "
+                "value and one reached input a trial."
+            )
+        if np.isinf(values).any():
+            raise InputError(f"y holds infinity at row {int(np.argmax(np.isinf(values)))}; give NaN for failed trials.")
+        self._commanded, self._reached, self._pending = list(commanded), list(actual), list(waiting)
+        self._values = values.tolist()
+
+    def equal(self, other: "Trials") -> bool:
+        """Tell whether the same trials have been told, in the same order; pending ones do not matter."""
+        return (
+            np.array_equal(self.values, other.values, equal_nan=True)
+            and np.array_equal(self.commanded, other.commanded)
+            and np.array_equal(self.reached, other.reached)
+        )
+
     def forget(self, x: ArrayLike) -> None:
         """Drop the pending trial at x (d,); raises InputError if there is none."""
         index = self._waiting(self._box.to_unit(x))
@@ -94,6 +118,18 @@ class Trials:
     def _waiting(self, u: NDArray[np.float64]) -> int | None:
         matches = np.flatnonzero(same(u, self.pending))
         return int(matches[0]) if len(matches) else None
+
+    def _all_inside(self, name: str, X: ArrayLike) -> NDArray[np.float64]:
+        """Return points (k, d) as points of the cube."""
+        points = np.asarray(X, dtype=np.float64)
+        points = points.reshape(-1, self._box.dimension) if points.size == 0 else points
+        U = self._box.to_unit(points)
+        if U.ndim != 2:
+            raise InputError(f"{name} has shape {U.shape}; give one row a trial, (t, {self._box.dimension}).")
+        if not (np.isfinite(U).all() and self._box.contains(points)):
+            bad = next(p for p in points if not (np.isfinite(p).all() and self._box.contains(p)))
+            raise InputError(f"{name} holds {self._box.as_dict(bad)}, which is not inside {self._box}.")
+        return np.clip(U, 0.0, 1.0)
 
     def _inside(self, name: str, x: ArrayLike) -> NDArray[np.float64]:
         u = self._box.to_unit(x)
