@@ -1,0 +1,68 @@
+"""Inputs that cannot be tried everywhere: integers, steps and choices inside a cube that knows only real numbers.
+
+The model is asked at the nearest point that can be tried, so that it is constant wherever rounding would give the same
+trial (Garrido-Merchan and Hernandez-Lobato 2020, Neurocomputing 380, 20-35). Perturbed points are rounded after they
+have been perturbed.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.optimization.surrogate import FitDiagnostics, Moments, Posterior, Regions
+
+__all__ = ["Lattice", "LatticePosterior"]
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Which points of the unit cube can be tried."""
+
+    snap: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    """maps points (..., d) to the nearest ones that can be tried; those stay where they are"""
+    smooth: NDArray[np.bool_]
+    """whether a coordinate can be tried everywhere, (d,)"""
+
+
+class LatticePosterior:
+    """A posterior that is asked at the points of a lattice only."""
+
+    def __init__(self, posterior: Posterior, lattice: Lattice):
+        self._posterior: Final = posterior
+        self._lattice: Final = lattice
+        self.diagnostics: Final[FitDiagnostics] = posterior.diagnostics
+        self.regions: Final[Regions] = posterior.regions
+
+    def average(
+        self,
+        queries: NDArray[np.float64],
+        offsets: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        gradient: bool = False,
+        slopes: NDArray[np.float64] | None = None,
+    ) -> Moments:
+        """Return the moments of sum_i weights[i] f(snap(query + offsets[i])) for each query."""
+        points = self._lattice.snap(queries[:, None, :] + offsets)
+        held = np.broadcast_to(1.0 if slopes is None else slopes, points.shape) * self._lattice.smooth
+        return self._posterior.average(queries, points - queries[:, None, :], weights, gradient, held)
+
+    def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
+        """Return the moments of f(snap(query)) for each query."""
+        moments = self._posterior.moments(self._lattice.snap(queries), gradient)
+        if moments.mean_gradient is None or moments.variance_gradient is None:
+            return moments
+        smooth = self._lattice.smooth
+        return moments._replace(
+            mean_gradient=moments.mean_gradient * smooth, variance_gradient=moments.variance_gradient * smooth
+        )
+
+    def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return joint draws (m, q, b, s) of f at the snapped points (q, s, d)."""
+        return self._posterior.sample(self._lattice.snap(points), normals)
+
+    def with_pending(self, X: NDArray[np.float64]) -> "LatticePosterior":
+        """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
+        return LatticePosterior(self._posterior.with_pending(self._lattice.snap(X)), self._lattice)
