@@ -326,3 +326,58 @@ def test_bad_place_of_the_recommendation():
     optimizer.tell([0.0, 5.0], 1.0)
     with pytest.raises(InputError, match="observed"):
         optimizer.recommend("nowhere")
+
+
+@pytest.mark.parametrize("settings", [{}, {"input_noise": InputNoise.unit(0.05)}, {"noise": "inferred"}])
+def test_the_promise_shrinks_as_little_is_left_to_find(settings):
+    optimizer = Optimizer(Box.unit(1), seed=0, n_initial=4, **settings)
+    promises = []
+    for i in range(16):
+        x = optimizer.ask()
+        optimizer.tell(x, -float((x[0] - 0.4) ** 2))
+        if i >= 3:
+            promises.append(optimizer.promise())
+    assert all(np.isfinite(promises))
+    assert 0.0 <= promises[-1] < 0.1 * promises[0]
+    assert optimizer.promise() == promises[-1]
+
+
+def test_a_restored_optimizer_is_the_one_that_was_told():
+    box = Box({"a": (-1.0, 1.0), "b": (0.0, 5.0)})
+    told, restored = (Optimizer(box, seed=3, n_initial=5, input_noise=InputNoise.unit(0.05)) for _ in range(2))
+    for i in range(12):
+        x = told.ask()
+        told.tell(x, None if i == 4 else float(x[0] - x[1] ** 2), failed=i == 4)
+    waiting = told.ask()
+    restored.restore(told.X, told.y, pending=told.pending)
+    assert np.array_equal(restored.pending, waiting[None, :])
+    assert np.array_equal(restored.ask(), told.ask())
+    assert np.array_equal(restored.recommend().x, told.recommend().x)
+    restored.restore(told.X[:8], told.y[:8])
+    assert len(restored.y) == 8
+    assert np.isnan(restored.y[4])
+
+
+def test_the_number_of_a_trial_is_its_place_in_the_design():
+    one, other = (Optimizer(Box.unit(2), seed=0, n_initial=6) for _ in range(2))
+    points = one.ask(6)
+    assert np.array_equal(other.ask(number=4), points[4])
+    assert np.array_equal(other.ask(2, number=1), points[1:3])
+
+
+@pytest.mark.parametrize(
+    ("X", "y", "message"),
+    [
+        ([[0.5, 0.5]], [1.0, 2.0], "one value"),
+        ([[0.5, 1.5]], [1.0], "not inside"),
+        ([[0.5, np.nan]], [1.0], "not inside"),
+        ([[0.5, 0.5]], [np.inf], "infinity"),
+        ([0.5, 0.5], [1.0], "shape"),
+    ],
+)
+def test_bad_stored_trials_are_refused_and_nothing_is_lost(X, y, message):
+    optimizer = Optimizer(Box.unit(2), seed=0)
+    optimizer.tell([0.1, 0.2], 1.0)
+    with pytest.raises(InputError, match=message):
+        optimizer.restore(X, y)
+    assert optimizer.y.tolist() == [1.0]

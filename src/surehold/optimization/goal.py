@@ -7,7 +7,7 @@ Legend
     outcome   UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over perturbations i and particles j     thesis (3.21)
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -134,6 +134,35 @@ class Goal:
         if self.criterion.scale == "robust":
             found = np.concatenate([self._looks(posterior, found[0]), found])
         return found
+
+    def promise(
+        self,
+        posterior: Posterior,
+        tried: NDArray[np.float64],
+        observed: NDArray[np.float64],
+        rng: np.random.Generator,
+    ) -> float:
+        """Return the largest improvement, expected of any input, of the outcome under the input noise.
+
+        Over the best of the inputs tried (n, d), whose values are `observed` (n,). Of a risk measure its improvement;
+        of the worst case that of the mean, for the worst case has no distribution.
+        """
+        d = tried.shape[1]
+        if self.risk.name in ("mean", "worst"):
+            exact_inputs = len(self.accurate.quadrature.weights) == 1
+            goal = replace(
+                self, criterion=CriterionName("ei", "exact" if exact_inputs else "robust"), risk=Risk("mean")
+            )
+            best, anchors = goal._incumbent(posterior, tried, observed)
+            objective, screen = (
+                goal._acquisition(posterior, perturbations, best, 0.0)
+                for perturbations in (self.accurate, self.accurate if exact_inputs else self.coarse)
+            )
+        else:
+            best, anchors = self._incumbent(posterior, tried, observed)
+            objective = screen = RiskImprovement(posterior, self.accurate, self.risk, float(best), rng)
+        found = maximizer.multistart(objective, screen, d, anchors, rng, posterior.regions)
+        return max(float(objective(found[:1])[0]), 0.0)
 
     def _stalled(
         self, posterior: Posterior, tried: NDArray[np.float64], observed: NDArray[np.float64], trials: int

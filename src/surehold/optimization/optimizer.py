@@ -310,6 +310,19 @@ class Optimizer:
             mean, variance = mixture(perturbations.outcome(self._posterior(), U))
         return mean, np.sqrt(variance)
 
+    def promise(self) -> float:
+        """Return the largest improvement that a further input is expected to bring, in the outputs' units.
+
+        Of the outcome under the input noise, over the best input tried so far; small where there is little left to
+        find. Raises InputError if no trial has given a value yet.
+        """
+        told = self._trials.successful
+        with single_threaded():
+            posterior = self._posterior()
+            return self._goal.promise(
+                posterior, self._trials.reached[told], self._trials.values[told], self._rng(4, len(self._trials))
+            )
+
     @property
     def posterior(self) -> Posterior:
         """The surrogate conditioned on the trials told so far; inputs in the unit cube."""
