@@ -1,6 +1,6 @@
 """Best value observed at the thesis' budgets, beside other optimizers: `python -m benchmarks.best_observed`.
 
-    python -m benchmarks.best_observed --seeds 20 --methods "surehold gp" "Optuna TPE" --problems rkhs gf
+    python -m benchmarks.best_observed --seeds 20 --methods "surehold gp" optuna-tpe --problems rkhs gf
 
 Every method gets the same Latin hypercube as its initial design, seed by seed. Printed are mean and standard error of
 the best value, the number of evaluations to come within 1 % of the maximum (median and 90th percentile over seeds; "-"
@@ -16,7 +16,8 @@ from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 import surehold as sh
-from benchmarks.peers import Surehold, peers
+from surehold.campaigns.methods import Surehold
+from surehold.campaigns.peers import installed_peers
 
 BUDGETS = {"rkhs": (5, 50), "gf": (20, 60), "gm": (30, 140), "gf-stretched": (20, 60)}
 OURS = {"surehold gp": {}, "surehold tgp": {"surrogate": "tgp"}}
@@ -30,8 +31,8 @@ def problem_named(name):
 def makers(problem):
     preset = "thesis-gf" if problem == "gf-stretched" else f"thesis-{problem}"
     settings = {**OURS, **{name: {**extra, "preset": preset} for name, extra in THESIS.items()}}
-    ours = {name: (lambda d, initial, seed, s=s: Surehold(d, initial, seed, **s)) for name, s in settings.items()}
-    return {**ours, **peers()}
+    ours = {name: (lambda d, initial, seed, s=s: Surehold(d, initial, seed, None, s)) for name, s in settings.items()}
+    return {**ours, **installed_peers()}
 
 
 def run(maker, problem, initial, budget, seed):

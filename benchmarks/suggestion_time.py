@@ -13,8 +13,8 @@ from scipy.linalg import lapack
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
-import surehold as sh
-from benchmarks.peers import Surehold, peers
+from surehold.campaigns.methods import Surehold
+from surehold.campaigns.peers import installed_peers
 
 SETTINGS = ((50, 2), (140, 2), (150, 7))
 ASKS = 5
@@ -55,22 +55,19 @@ def seconds_per_ask(maker, n, d):
 
 
 def main():
-    noise = {"input_noise": sh.InputNoise.unit(0.05)}
     ours = {
-        "surehold gp": {},
-        "surehold gp, input noise": noise,
-        "surehold tgp": {"surrogate": "tgp"},
-        "surehold tgp, input noise": {"surrogate": "tgp", **noise},
+        "surehold gp": (None, {}),
+        "surehold gp, input noise": (0.05, {}),
+        "surehold tgp": (None, {"surrogate": "tgp"}),
+        "surehold tgp, input noise": (0.05, {"surrogate": "tgp"}),
     }
-    makers = {
-        name: (lambda d, initial, seed, s=settings: Surehold(d, initial, seed, **s)) for name, settings in ours.items()
-    }
+    makers = {name: (lambda d, initial, seed, s=told: Surehold(d, initial, seed, *s)) for name, told in ours.items()}
     with threadpool_limits(1):
         unit = yardstick()
         print(f"yardstick: dpotrf 140 x 140 takes {1e3 * unit:.3f} ms")
         print(f"{'':28}" + "".join(f"{f'n = {n}, d = {d}':>34}" for n, d in SETTINGS))
         base = {}
-        for name, maker in {**makers, **peers()}.items():
+        for name, maker in {**makers, **installed_peers()}.items():
             cells = []
             for setting in SETTINGS:
                 seconds = seconds_per_ask(maker, *setting)

@@ -1,0 +1,142 @@
+"""Methods of a campaign behind one interface: our optimizer by its settings, and other libraries'.
+
+All work on the unit cube, maximize, and get the same initial design.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.campaigns.peers import PEERS, REQUIRES, installed_peers
+from surehold.campaigns.plan import Cell
+from surehold.errors import InputError, unknown_name
+from surehold.optimization.box import Box
+from surehold.optimization.gaussian_process import GaussianProcess
+from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.optimizer import SURROGATES, Optimizer
+from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
+from surehold.optimization.risk import Risk
+
+__all__ = ["METHODS", "Method", "build_method", "checked_settings"]
+
+#: Optimizers that a plan may name.
+METHODS: Final = ("surehold", *PEERS)
+_ROBUST: Final = ("surehold", "botorch")  # those that can be told of the input noise
+_TREE: Final = ("min_leaf", "weight_power", "trees")
+_PROCESS: Final = ("noise", "output_range")
+_SETTINGS: Final = (
+    *("preset", "surrogate", "criterion", *_TREE, *_PROCESS),
+    *("risk", "alpha", "beta", "quadrature", "k", "border", "kappa"),
+)
+
+
+class Method(Protocol):
+    """What a campaign runs."""
+
+    def ask(self) -> NDArray[np.float64]:
+        """Return the next trial (d,) in the unit cube."""
+        ...
+
+    def tell(self, u: NDArray[np.float64], y: float) -> None:
+        """Record the outcome of a trial; NaN for one that failed."""
+        ...
+
+    def answer(self) -> NDArray[np.float64]:
+        """Return the input (d,) that the method would return now."""
+        ...
+
+
+class Surehold:
+    """Our optimizer by the settings of a plan."""
+
+    def __init__(
+        self, dimension: int, initial: NDArray[np.float64], seed: int, noise: float | None, settings: Mapping[str, Any]
+    ):
+        own = dict(settings)
+        box = Box.unit(dimension)
+        input_noise = None if noise is None else InputNoise.unit(noise)
+        if own.get("surrogate", "gp") == "tgp":
+            own["surrogate"] = _treed(own, box, input_noise, seed)
+        options = {name: own.pop(name) for name in ("alpha", "beta") if name in own}
+        if "risk" in own:
+            own["risk"] = Risk(own["risk"], **options)
+        self._optimizer = Optimizer(box, input_noise=input_noise, n_initial=len(initial), seed=seed, **own)
+        self._waiting = list(initial)
+
+    def ask(self) -> NDArray[np.float64]:
+        """Return the next trial."""
+        return self._waiting.pop(0) if self._waiting else self._optimizer.ask()
+
+    def tell(self, u: NDArray[np.float64], y: float) -> None:
+        """Record a trial."""
+        if np.isfinite(y):
+            self._optimizer.tell(u, y)
+        else:
+            self._optimizer.tell(u, failed=True)
+
+    def answer(self) -> NDArray[np.float64]:
+        """Return the recommended input; without input noise the highest observed, as the thesis reports it."""
+        if self._optimizer.input_noise is None:
+            return self._optimizer.X[int(np.nanargmax(self._optimizer.y))]
+        return self._optimizer.recommend().x
+
+    @property
+    def leaves(self) -> int:
+        """Leaves of the tree; 1 of a surrogate without one."""
+        partition = self._optimizer.posterior.diagnostics.partition
+        return 1 if partition is None else partition.leaves
+
+
+def build_method(cell: Cell, dimension: int, initial: NDArray[np.float64], seed: int) -> Method:
+    """Return the method of a cell, about to start.
+
+    Raises
+    ------
+    InputError
+        If a setting has no valid value, or a library is not installed.
+    """
+    told = cell.as_data()
+    noise = cell.on.input_noise if cell.by.robust else None
+    if cell.by.optimizer == "surehold":
+        return Surehold(dimension, initial, seed, noise, told["settings"])
+    if cell.by.optimizer not in installed_peers():
+        missing = ", ".join(REQUIRES[cell.by.optimizer])
+        raise InputError(f"method '{cell.method}' needs {missing}; install them: pip install 'surehold[peers]'.")
+    extra = {} if noise is None else {"noise": noise}
+    return PEERS[cell.by.optimizer](dimension, initial, seed, **extra)
+
+
+def checked_settings(where: str, optimizer: str, settings: Mapping[str, Any], robust: bool) -> None:
+    """Check the names of settings, and that the optimizer can be told of the input noise where it shall be.
+
+    Raises
+    ------
+    InputError
+        With the nearest valid name.
+    """
+    valid = _SETTINGS if optimizer == "surehold" else ()
+    for name, value in settings.items():
+        if not valid:
+            raise InputError(f"{where} sets {name!r}, but '{optimizer}' runs with its own defaults; leave it out.")
+        if name not in valid:
+            raise unknown_name(f"setting of {where}", name, (*valid, "optimizer", "robust"))
+        if name == "preset" and value is not None:
+            thesis_preset(value)
+        if name == "surrogate" and value not in SURROGATES:
+            raise unknown_name(f"surrogate of {where}", value, SURROGATES)
+    if robust and optimizer not in _ROBUST:
+        raise InputError(f"{where}: '{optimizer}' cannot be told of input noise; leave `robust` out.")
+
+
+def _treed(own: dict[str, Any], box: Box, input_noise: InputNoise | None, seed: int) -> Any:
+    thesis = None if own.get("preset") is None else thesis_preset(own["preset"])
+    changes = {name: own.pop(name) for name in _TREE if name in own}
+    process_settings = {name: own.get(name) for name in _PROCESS if own.get(name) is not None}
+    if "weight_power" in changes:
+        changes["weight_power"] = float(changes["weight_power"])
+    if thesis is None:
+        return TREED._replace(**changes).surrogate(GaussianProcess(**process_settings), box, input_noise, seed)
+    tree = TreedSettings(thesis.min_leaf, continued=True)._replace(**changes)
+    return tree.surrogate(thesis.gaussian_process(), box, input_noise, seed)

@@ -1,0 +1,204 @@
+"""What a campaign runs: problems x methods x seeds, with budgets and scoring. Plain data; nothing here computes.
+
+A plan is written in YAML (`plan_file.load_plan`) or built in Python from the classes below. The seed of a run decides
+its initial design, its observation noise and the perturbations that score it, all of them the same for every method:
+runs of one seed are paired.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from surehold.errors import InputError, unknown_name
+
+__all__ = ["Cell", "MethodSetup", "Plan", "ProblemSetup", "Task", "share_of"]
+
+
+@dataclass(frozen=True)
+class ProblemSetup:
+    """A problem of a plan, its budget and how answers are scored."""
+
+    function: str
+    """"rkhs", "gm", "gf", "gf-stretched", "grasp", `package.module:function` or `path/file.py:function`"""
+    trials: int
+    """budget, initial design included"""
+    initial: int
+    """trials of the initial design, a Latin hypercube"""
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    """of a grasp (object, facet, variables, contact, ...); bounds of an own function, `NAME=LOWER:UPPER,...`"""
+    input_noise: float | None = None
+    """standard deviation in unit-cube units, in every variable; None: answers are not scored under noise"""
+    requeries: int = 100
+    """perturbed re-queries that score an answer"""
+    observation_noise: float = 0.0
+    """s: what is told is f(x) - |e|, e ~ N(0, s^2)"""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """of the optimizer on this problem, such as a preset; settings of the method come before these"""
+
+
+@dataclass(frozen=True)
+class MethodSetup:
+    """A method of a plan."""
+
+    optimizer: str = "surehold"
+    """"surehold", or another library's (see `methods.METHODS`)"""
+    robust: bool = False
+    """whether the method is told of the input noise"""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One problem with one method: what is repeated with many seeds."""
+
+    problem: str
+    """label in the plan"""
+    method: str
+    """label in the plan"""
+    on: ProblemSetup
+    by: MethodSetup
+
+    def as_data(self) -> dict[str, Any]:
+        """Return all settings, JSON-ready."""
+        on, by = self.on, self.by
+        own = {**on.settings, **by.settings} if by.optimizer == "surehold" else dict(by.settings)
+        return {
+            "function": on.function,
+            "arguments": dict(on.arguments),
+            "trials": on.trials,
+            "initial": on.initial,
+            "input_noise": on.input_noise,
+            "requeries": on.requeries,
+            "observation_noise": on.observation_noise,
+            "optimizer": by.optimizer,
+            "robust": by.robust,
+            "settings": {name: _plain(value) for name, value in own.items() if value is not None},
+        }
+
+    @property
+    def digest(self) -> str:
+        """Fingerprint of the settings: runs of equal digest and seed are the same run."""
+        text = json.dumps(self.as_data(), sort_keys=True, default=list)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+class Task(NamedTuple):
+    """One run to be made."""
+
+    cell: Cell
+    seed: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Problems x methods x seeds.
+
+    Raises
+    ------
+    InputError
+        If there is no problem, no method or no run, or a budget or noise is out of range.
+    """
+
+    name: str
+    title: str
+    problems: Mapping[str, ProblemSetup]
+    methods: Mapping[str, MethodSetup]
+    runs: int = 30
+    """seeds 0, 1, ..., runs - 1"""
+    note: str = ""
+    """shown in the report"""
+
+    def __post_init__(self) -> None:
+        if not self.problems or not self.methods:
+            raise InputError(f"plan '{self.name}' has no {'methods' if self.problems else 'problems'}; name one.")
+        _whole(f"runs of plan '{self.name}'", self.runs)
+        for label, on in self.problems.items():
+            where = f"of problem '{label}' in plan '{self.name}'"
+            for name in ("trials", "initial", "requeries"):
+                _whole(f"{name} {where}", getattr(on, name))
+            if on.initial > on.trials:
+                raise InputError(f"initial {where} is {on.initial}, but trials is {on.trials}; give at most as many.")
+            if on.input_noise is not None and not 0.0 < on.input_noise < 1.0:
+                raise InputError(f"input_noise {where} is {on.input_noise!r}; give a share of the box, such as 0.03.")
+            if not 0.0 <= on.observation_noise < float("inf"):
+                raise InputError(f"observation_noise {where} is {on.observation_noise!r}; give 0 or more.")
+            for name, by in self.methods.items():
+                if by.robust and on.input_noise is None:
+                    raise InputError(f"method '{name}' is robust, but input_noise {where} is missing; give it.")
+
+    def cells(self, only: Iterable[str] = ()) -> list[Cell]:
+        """Return every problem with every method; with `only`, of the problems and methods with these labels.
+
+        Raises
+        ------
+        InputError
+            For a label that is neither a problem nor a method.
+        """
+        wanted = set(only)
+        for label in wanted:
+            if label not in self.problems and label not in self.methods:
+                raise unknown_name(f"problem or method of plan '{self.name}'", label, [*self.problems, *self.methods])
+        problems = [label for label in self.problems if label in wanted] or list(self.problems)
+        methods = [label for label in self.methods if label in wanted] or list(self.methods)
+        return [Cell(p, m, self.problems[p], self.methods[m]) for p in problems for m in methods]
+
+    def tasks(self, runs: int | None = None, shard: tuple[int, int] = (1, 1), only: Iterable[str] = ()) -> list[Task]:
+        """Return the runs in the order they are made: seed by seed, so that all cells grow alike.
+
+        Parameters
+        ----------
+        runs
+            Number of seeds; the plan's if None.
+        shard
+            (i, n): the i-th of n shares, by seed, so that paired runs stay together.
+        only
+            Labels of problems and methods, see `cells`.
+
+        Raises
+        ------
+        InputError
+            For fewer than one run, or a share that does not exist.
+        """
+        count = _whole("runs", self.runs if runs is None else runs)
+        i, n = shard
+        if not 1 <= i <= n:
+            raise InputError(f"shard is {i}/{n}; give i/n with i from 1 to n, such as 2/8.")
+        cells = self.cells(only)
+        return [Task(cell, seed) for seed in range(i - 1, count, n) for cell in cells]
+
+
+def share_of(text: str) -> tuple[int, int]:
+    """Return (i, n) of a share written "i/n".
+
+    Raises
+    ------
+    InputError
+        If the text has another form, or i is not between 1 and n.
+
+    Examples
+    --------
+    >>> share_of("2/8")
+    (2, 8)
+    """
+    first, slash, second = text.partition("/")
+    try:
+        if not slash:
+            raise ValueError
+        i, n = int(first), int(second)
+    except ValueError:
+        raise InputError(f"shard {text!r} is not of the form i/n; write for example --shard 2/8.") from None
+    if not 1 <= i <= n:
+        raise InputError(f"shard is {i}/{n}; give i/n with i from 1 to n, such as 2/8.")
+    return i, n
+
+
+def _plain(value: Any) -> Any:
+    return "inf" if value == float("inf") else value  # JSON has no infinity
+
+
+def _whole(name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise InputError(f"{name} is {value!r}; give a whole number of 1 or more.")
+    return value
