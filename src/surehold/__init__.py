@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from surehold.optimization.recommendation import Recommendation
     from surehold.optimization.risk import Risk
     from surehold.optimization.treed_gaussian_process import TreedGaussianProcess
+    from surehold.studies.sampler import Sampler
 
 __version__ = "0.1.0"
 
@@ -30,6 +31,7 @@ __all__ = [
     "Recommendation",
     "Result",
     "Risk",
+    "Sampler",
     "SureholdError",
     "TreedGaussianProcess",
     "Trial",
@@ -48,6 +50,7 @@ _HOMES = {
     "Recommendation": "optimization.recommendation",
     "Risk": "optimization.risk",
     "Result": "optimization.maximization",
+    "Sampler": "studies.sampler",
     "SureholdError": "errors",
     "TreedGaussianProcess": "optimization.treed_gaussian_process",
     "Trial": "optimization.maximization",

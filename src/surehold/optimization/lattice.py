@@ -33,8 +33,8 @@ class LatticePosterior:
     def __init__(self, posterior: Posterior, lattice: Lattice):
         self._posterior: Final = posterior
         self._lattice: Final = lattice
-        self.diagnostics: Final[FitDiagnostics] = posterior.diagnostics
-        self.regions: Final[Regions] = posterior.regions
+        self.diagnostics: FitDiagnostics = posterior.diagnostics
+        self.regions: Regions = posterior.regions
 
     def average(
         self,

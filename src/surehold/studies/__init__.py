@@ -1,1 +1,6 @@
-"""Runs that survive: storage, workers, robots that answer late. The floor is laid; nothing stands on it yet."""
+"""One run that survives: storage, resume, workers, and trials made by a robot. Stands on Optuna."""
+
+from importlib.util import find_spec
+
+if find_spec("optuna") is None:
+    raise ModuleNotFoundError("surehold.studies stands on Optuna; install it with: pip install 'surehold[study]'")

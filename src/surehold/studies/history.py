@@ -1,0 +1,81 @@
+"""What the stored trials of a study say to the optimizer, whoever wrote them.
+
+    state in Optuna                     for the optimizer
+    COMPLETE, or PRUNED with a value    told; failed where the value is not finite
+    FAIL, or PRUNED without a value     failed: it counts as the lowest value told, so that it is avoided
+    FAIL, and later retried             nothing: its worker died, and the retried trial stands for it
+    RUNNING                             pending, once its parameters are known
+    WAITING                             pending, where all of its parameters are set
+
+Trials outside of the search space (other parameters, other ranges) are left out.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from optuna.trial import FrozenTrial, TrialState
+
+from surehold.studies.search_space import SearchSpace
+
+__all__ = ["REACHED", "History", "history_of", "parameters_of"]
+
+#: Trial attribute that holds the parameters that were truly reached.
+REACHED: Final = "surehold:reached"
+
+
+class History(NamedTuple):
+    """The trials of a study, in the order of their numbers."""
+
+    X: NDArray[np.float64]
+    """commanded inputs (t, d), in the units of the search space's box"""
+    y: NDArray[np.float64]
+    """values (t,), larger is better; NaN for failed trials"""
+    reached: NDArray[np.float64]
+    """inputs truly reached (t, d)"""
+    pending: NDArray[np.float64]
+    """inputs under way (p, d)"""
+    numbers: NDArray[np.intp]
+    """numbers of the told trials (t,)"""
+
+
+def history_of(trials: Iterable[FrozenTrial], space: SearchSpace, maximize: bool, number: int | None = None) -> History:
+    """Return what the trials say, the one with that number (the one being asked for) left out."""
+    told: list[Mapping[str, Any]] = []
+    reached: list[Mapping[str, Any]] = []
+    pending: list[Mapping[str, Any]] = []
+    values: list[float] = []
+    numbers: list[int] = []
+    ordered = sorted(trials, key=lambda trial: trial.number)
+    retried = {k for trial in ordered for k in trial.system_attrs.get("retry_history", ())}
+    for trial in ordered:
+        if trial.number == number or trial.number in retried:
+            continue
+        parameters = parameters_of(trial)
+        if not space.contains(parameters):
+            continue
+        if not trial.state.is_finished():
+            pending.append(parameters)
+            continue
+        value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
+        told.append(parameters)
+        actual = parameters | trial.user_attrs.get(REACHED, {})
+        reached.append(actual if space.contains(actual) else parameters)
+        values.append(value if np.isfinite(value) else np.nan)
+        numbers.append(trial.number)
+    y = np.array(values, dtype=np.float64)
+    return History(
+        space.encode_all(told),
+        y if maximize else -y,
+        space.encode_all(reached),
+        space.encode_all(pending),
+        np.array(numbers, dtype=np.intp),
+    )
+
+
+def parameters_of(trial: FrozenTrial) -> dict[str, Any]:
+    """Return the parameters of a trial; of one that waits, or has just been begun, those that it will have."""
+    if trial.state.is_finished():
+        return dict(trial.params)
+    return trial.system_attrs.get("fixed_params", {}) | trial.params
