@@ -1,0 +1,210 @@
+import copy
+import pickle
+import warnings
+
+import numpy as np
+import optuna
+import pytest
+from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
+from optuna.trial import TrialState, create_trial
+
+import surehold as sh
+from surehold.errors import InputError
+
+SPACE = {"x": FloatDistribution(0.0, 1.0), "k": IntDistribution(1, 6), "c": CategoricalDistribution(["a", "b"])}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def quiet():
+    before = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    yield
+    optuna.logging.set_verbosity(before)
+
+
+def value(p):
+    return -((p["x"] - 0.3) ** 2) - 0.1 * abs(p["k"] - 4) - (0.5 if p["c"] == "a" else 0.0)
+
+
+def run(study, n, space=SPACE, f=value):
+    asked = []
+    for _ in range(n):
+        trial = study.ask(space)
+        asked.append(trial.params)
+        study.tell(trial, f(trial.params))
+    return asked
+
+
+def new(sampler, direction="maximize"):
+    return optuna.create_study(direction=direction, sampler=sampler)
+
+
+@pytest.mark.parametrize("surrogate", ["gp", "tgp"])
+def test_mixed_parameters_are_optimized(surrogate):
+    study = new(sh.Sampler(SPACE, seed=0, surrogate=surrogate, n_initial=10))
+    asked = run(study, 40)
+    assert study.best_params["k"] == 4
+    assert study.best_params["c"] == "b"
+    assert abs(study.best_params["x"] - 0.3) < 0.02
+    assert len({tuple(p.values()) for p in asked}) == len(asked)
+
+
+def test_minimizing_is_maximizing_the_negative():
+    up = run(new(sh.Sampler(SPACE, seed=1)), 20)
+    down = run(new(sh.Sampler(SPACE, seed=1), "minimize"), 20, f=lambda p: -value(p))
+    assert up == down
+
+
+def test_input_noise_moves_the_answer_off_the_spike():
+    def spiked(p):
+        return 1.5 * np.exp(-0.5 * ((p["x"] - 0.2) / 0.01) ** 2) + np.exp(-0.5 * ((p["x"] - 0.7) / 0.1) ** 2)
+
+    sampler = sh.Sampler({"x": (0.0, 1.0)}, input_noise=sh.InputNoise.unit(0.03), seed=0)
+    study = new(sampler)
+    run(study, 40, {"x": FloatDistribution(0.0, 1.0)}, spiked)
+    assert abs(sampler.optimizer(study).recommend().x[0] - 0.7) < 0.03
+
+
+def test_the_next_trial_depends_on_history_number_and_seed_alone():
+    study = new(sh.Sampler(SPACE, seed=5))
+    asked = run(study, 16)
+    for k in range(16):
+        other = optuna.create_study(direction="maximize", sampler=sh.Sampler(SPACE, seed=5))
+        other.add_trials(study.trials[:k])
+        assert other.ask(SPACE).params == asked[k]
+    assert new(sh.Sampler(SPACE, seed=6)).ask(SPACE).params != asked[0]
+
+
+def test_the_first_trial_is_ours_where_the_space_is_known():
+    sampler = sh.Sampler({"x": (0.0, 1.0), "y": (0.0, 1.0)}, seed=0, n_initial=8)
+    study = new(sampler)
+    box = sh.Box({"x": (0.0, 1.0), "y": (0.0, 1.0)})
+    expected = sh.Optimizer(box, seed=0, n_initial=8).ask(8)
+    asked = run(study, 8, {n: FloatDistribution(0.0, 1.0) for n in "xy"}, lambda p: p["x"])
+    assert np.allclose([[p["x"], p["y"]] for p in asked], expected, atol=1e-15)
+
+
+def add(study, state, params, **more):
+    study.add_trial(create_trial(state=state, params=params, distributions=SPACE, **more))
+
+
+HISTORY = [
+    {"x": 0.1, "k": 1, "c": "a"},
+    {"x": 0.9, "k": 6, "c": "b"},
+    {"x": 0.5, "k": 3, "c": "a"},
+    {"x": 0.33, "k": 4, "c": "b"},
+]
+
+
+def complete(study, rows=HISTORY):
+    for p in rows:
+        add(study, TrialState.COMPLETE, p, value=value(p))
+
+
+def test_running_and_enqueued_trials_are_pending():
+    sampler = sh.Sampler(SPACE, seed=0, n_initial=2)
+    study = new(sampler)
+    complete(study)
+    add(study, TrialState.RUNNING, {"x": 0.25, "k": 4, "c": "b"})
+    study.enqueue_trial({"x": 0.35, "k": 4, "c": "b"})
+    study.enqueue_trial({"x": 0.6})  # incomplete: nothing is known of it yet
+    optimizer = sampler.optimizer(study)
+    assert optimizer.pending[:, 0].tolist() == [0.25, 0.35]
+    assert len(optimizer.y) == 4
+    trial = study.ask(SPACE)  # the enqueued one comes first
+    assert trial.params == {"x": 0.35, "k": 4, "c": "b"}
+    assert study.ask(SPACE).params["x"] == 0.6
+
+
+def test_failed_trials_are_avoided_and_retried_ones_forgotten():
+    sampler = sh.Sampler(SPACE, seed=0)
+    study = new(sampler)
+    complete(study)
+    add(study, TrialState.FAIL, {"x": 0.4, "k": 4, "c": "b"})
+    add(study, TrialState.FAIL, {"x": 0.7, "k": 4, "c": "b"})
+    add(study, TrialState.PRUNED, {"x": 0.8, "k": 4, "c": "b"})
+    add(study, TrialState.WAITING, {"x": 0.7, "k": 4, "c": "b"}, system_attrs={"retry_history": [5]})
+    optimizer = sampler.optimizer(study)
+    assert np.isnan(optimizer.y[4:]).all()
+    assert optimizer.X[4:, 0].tolist() == [0.4, 0.8]
+    assert optimizer.pending[:, 0].tolist() == [0.7]
+
+
+def test_infinite_values_count_as_failed_and_foreign_trials_are_left_out():
+    sampler = sh.Sampler(SPACE, seed=0, n_initial=2)
+    study = new(sampler)
+    complete(study)
+    add(study, TrialState.COMPLETE, HISTORY[0], value=float("inf"))
+    study.add_trial(create_trial(params={"z": 1.0}, distributions={"z": FloatDistribution(0, 2)}, value=1.0))
+    optimizer = sampler.optimizer(study)
+    assert np.isnan(optimizer.y[4])
+    assert len(optimizer.y) == 5
+    assert study.ask(SPACE).params["c"] in "ab"
+
+
+def test_conditional_spaces_fall_back_with_a_warning(caplog):
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna.logging.enable_propagation()
+    try:
+        study = new(sh.Sampler({"x": (0.0, 1.0)}, seed=0))
+        one = study.ask()
+        one.suggest_float("x", 0.0, 1.0)
+        drawn = one.suggest_float("extra", 0.0, 1.0)
+        assert "Parameter 'extra' of trial 0 is drawn at random" in caplog.text
+    finally:
+        optuna.logging.disable_propagation()
+        optuna.logging.set_verbosity(optuna.logging.ERROR)
+    again = new(sh.Sampler({"x": (0.0, 1.0)}, seed=0, warn_independent_sampling=False)).ask()
+    assert again.suggest_float("extra", 0.0, 1.0) == drawn  # from (seed, number, name) alone
+    assert again.suggest_float("other", 0.0, 1.0) != drawn
+
+
+def test_parallel_threads_and_copies():
+    study = new(sh.Sampler(SPACE, seed=0, n_initial=4))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        study.optimize(lambda t: value({n: t._suggest(n, d) for n, d in SPACE.items()}), n_trials=16, n_jobs=4)
+    assert len(study.trials) == 16
+    assert all(t.state == TrialState.COMPLETE for t in study.trials)
+    expected = study.sampler.suggest(study.trials, 16, True)
+    for other in (pickle.loads(pickle.dumps(study.sampler)), copy.deepcopy(study.sampler)):
+        assert other.suggest(study.trials, 16, True) == expected
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"search_space": {"x": (1.0, 0.0)}}, "smaller"),
+        ({"search_space": SPACE, "criterion": "eii"}, "did you mean"),
+        ({"surrogate": "gpp"}, "gpp"),
+        ({"seed": -1}, "seed"),
+        ({"search_space": SPACE, "input_noise": sh.InputNoise({"x": 0.1})}, "says nothing about k"),
+        ({"criterion": "robust_ei"}, "need input noise"),
+    ],
+)
+def test_bad_settings_are_refused_at_once(arguments, message):
+    with pytest.raises(InputError, match=message):
+        sh.Sampler(**arguments)
+
+
+def test_several_objectives_are_refused():
+    study = optuna.create_study(directions=["minimize", "maximize"], sampler=sh.Sampler(SPACE))
+    with pytest.raises(ValueError, match="multi-objective"):
+        study.ask(SPACE)
+
+
+def test_only_one_value_is_no_optimization_but_a_trial():
+    study = new(sh.Sampler({"a": IntDistribution(1, 1)}))
+    assert study.ask({"a": IntDistribution(1, 1)}).params == {"a": 1}
+    with pytest.raises(InputError, match="one value only"):
+        study.sampler.optimizer(study)
+
+
+def test_many_trials_are_carried_by_a_tree():
+    sampler = sh.Sampler({"x": (0.0, 1.0)}, seed=0)
+    study = new(sampler)
+    space = {"x": FloatDistribution(0.0, 1.0)}
+    for x in np.random.default_rng(0).random(450):
+        study.add_trial(create_trial(params={"x": x}, distributions=space, value=float(np.sin(9 * x))))
+    assert sampler.optimizer(study).posterior.diagnostics.partition.leaves > 1
+    assert 0.0 <= study.ask(space).params["x"] <= 1.0
