@@ -31,12 +31,12 @@ def test_gradients(name, border, posterior):
     acquisition = acquisition_of(posterior, name, border)
     values = acquisition(U)
     h = 1e-6
+    together, gradients = acquisition.with_gradient(U)
+    np.testing.assert_allclose(together, values, rtol=1e-9, atol=1e-12)
     for i, u in enumerate(U):
-        value, gradient = acquisition.with_gradient(u)
-        assert value == pytest.approx(values[i], rel=1e-9, abs=1e-12)
         steps = h * np.eye(2)
         numeric = (acquisition(u + steps) - acquisition(u - steps)) / (2 * h)
-        np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-6)
+        np.testing.assert_allclose(gradients[i], numeric, rtol=1e-4, atol=1e-6)
 
 
 def test_improvement_is_averaged_over_particles(posterior):
@@ -78,7 +78,7 @@ def test_negative_center_weight_gives_minus_infinity_where_the_sum_is_negative(p
     values, plain = acquisition(grid), acquisition_of(posterior, "uei", k=-1.9)(grid)
     assert np.array_equal(np.isfinite(values), plain > 0.0)
     assert (plain <= 0.0).any()
-    assert not acquisition.with_gradient(grid[int(np.argmin(plain))])[1].any()
+    assert not acquisition.with_gradient(grid[[int(np.argmin(plain))]])[1].any()
 
 
 def test_where_to_look_takes_the_trial_that_tells_most(posterior):

@@ -190,7 +190,7 @@ def test_infers_the_noise():
     assert 0.16 < np.median(noise) < 0.25
 
 
-@pytest.mark.parametrize("method", ["slice", "map"])
+@pytest.mark.parametrize("method", ["elliptical_slice", "slice", "map"])
 def test_interpolates_and_repeats_itself(method, data):
     X, y, Q = data
     learning = Learning(method=method)
@@ -212,9 +212,9 @@ def test_the_mode_is_a_maximum(data):
         assert log_posterior(theta + step, evidence) <= top + 1e-5
 
 
-def test_previous_particles_start_the_chain_where_asked(data):
+def test_coordinate_wise_chains_go_on_from_the_previous_particles(data):
     X, y, _ = data
-    model = GaussianProcess(learning=Learning(particles=2, burn_in=0, start="previous"))
+    model = GaussianProcess(learning=Learning("slice", particles=2, burn_in=0))
     first = model.condition(X, y, np.random.default_rng(0))
     follow = model.condition(X, y, np.random.default_rng(1), first)
     fresh = model.condition(X, y, np.random.default_rng(1))
@@ -343,7 +343,6 @@ def test_bad_settings(options, words):
     ("build", "words"),
     [
         (lambda: Learning(method="mcmc"), "learning method"),
-        (lambda: Learning(start="zero"), "start"),
         (lambda: Learning(particles=0), "particles"),
         (lambda: Learning(burn_in=-1), "burn_in"),
         (lambda: Learning(thin=1.5), "thin"),

@@ -15,8 +15,8 @@ class Function:
     def __call__(self, U):
         return self._value(U)
 
-    def with_gradient(self, u):
-        return float(self._value(u[None, :])[0]), self._gradient(u)
+    def with_gradient(self, U):
+        return self._value(U), self._gradient(U)
 
 
 def bowl(center):
@@ -33,7 +33,7 @@ def two_peaks(width):
         return hill, peak
 
     def gradient(u):
-        hill, peak = parts(u)
+        hill, peak = (part[:, None] for part in parts(u))
         return -hill * (u - 0.25) / 0.2**2 - peak * (u - 0.8) / width**2
 
     return Function(lambda U: sum(parts(U)), gradient)

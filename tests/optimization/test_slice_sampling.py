@@ -3,6 +3,7 @@ import pytest
 from numba import njit, types
 from scipy.stats import kstest, norm
 
+from surehold.optimization.elliptical_slice_sampling import elliptical_slice_sample
 from surehold.optimization.kernels import correlation
 from surehold.optimization.likelihood import EVIDENCE_TYPE, Evidence, log_posterior
 from surehold.optimization.slice_sampling import slice_sample
@@ -64,16 +65,29 @@ def assert_expectation(draws, expected, what):
     assert abs(draws.mean() - expected) < 4.5 * error, f"{what}: {draws.mean()} against {expected} +- {error}"
 
 
-@pytest.mark.parametrize("widths", [0.3, 6.0, [0.05, 40.0]])
-def test_moments_of_a_correlated_normal(widths):
-    chain = slice_sample(
-        correlated_normal,
-        NOTHING,
-        np.zeros(2),
-        np.random.default_rng(1),
-        keep=30_000,
-        burn_in=100,
-        widths=np.array(widths),
+def coordinate_wise(density, evidence, start, rng, widths=6.0, **counts):
+    return slice_sample(density, evidence, start, rng, widths=widths, **counts)
+
+
+def elliptical(density, evidence, start, rng, spread=1.0, **counts):
+    return elliptical_slice_sample(density, evidence, start, spread * np.eye(start.size), rng, **counts)
+
+
+@pytest.mark.parametrize(
+    ("sampler", "tuning"),
+    [
+        (coordinate_wise, {"widths": 0.3}),
+        (coordinate_wise, {"widths": 6.0}),
+        (coordinate_wise, {"widths": np.array([0.05, 40.0])}),
+        (elliptical, {"spread": 1.0}),
+        (elliptical, {"spread": 3.0}),
+        (elliptical, {"spread": 0.7}),
+    ],
+)
+def test_moments_of_a_correlated_normal(sampler, tuning):
+    """Whatever the first guesses of widths, or of the covariance around a center that is not the mode."""
+    chain = sampler(
+        correlated_normal, NOTHING, np.zeros(2), np.random.default_rng(1), keep=30_000, burn_in=100, **tuning
     )
     z = (chain.states - MEAN) / DEVIATION
     for i in range(2):
@@ -84,8 +98,9 @@ def test_moments_of_a_correlated_normal(widths):
     assert_expectation(z[:, 0] * z[:, 1], RHO, "correlation")
 
 
-def test_bounded_support_is_respected():
-    chain = slice_sample(
+@pytest.mark.parametrize("sampler", [coordinate_wise, elliptical])
+def test_bounded_support_is_respected(sampler):
+    chain = sampler(
         truncated_exponential, NOTHING, np.array([1.0]), np.random.default_rng(2), keep=20_000, burn_in=50, thin=3
     )
     x = chain.states[:, 0]
@@ -95,7 +110,8 @@ def test_bounded_support_is_respected():
     np.testing.assert_allclose(chain.log_densities, -x)
 
 
-def test_joint_distribution_of_hyperparameters_and_data():
+@pytest.mark.parametrize(("sampler", "tuning"), [(coordinate_wise, {"widths": 2.0}), (elliptical, {"spread": 0.8})])
+def test_joint_distribution_of_hyperparameters_and_data(sampler, tuning):
     """Geweke 2004: draw theta from the prior, data given theta, then the chain on them; theta is as before."""
     rng = np.random.default_rng(3)
     X = rng.random((6, 1))
@@ -105,7 +121,7 @@ def test_joint_distribution_of_hyperparameters_and_data():
         C = correlation("matern52", X, X, np.exp(theta[:1])) + (1e-4 + np.exp(theta[1])) * np.eye(6)
         y = np.linalg.cholesky(C) @ rng.standard_normal(6)
         evidence = evidence_of(X, y, learn_noise=True)
-        chain = slice_sample(log_posterior, evidence, theta, rng, keep=1, burn_in=4, widths=2.0)
+        chain = sampler(log_posterior, evidence, theta, rng, keep=1, burn_in=4, **tuning)
         after.append(chain.states[0])
     z = (np.array(after) + 0.5) / 0.8
     for i in range(2):

@@ -209,7 +209,7 @@ def test_another_seed_gives_other_particles():
 
 def test_chains_continue_from_the_leaf_that_overlaps_most():
     X, y = data(60)
-    still = GaussianProcess(prior=Prior((0.0, 3.0)), learning=Learning(particles=1, burn_in=0, start="previous"))
+    still = GaussianProcess(prior=Prior((0.0, 3.0)), learning=Learning("slice", particles=1, burn_in=0))
     tree = model(process=still, continued=True)
     old = tree.condition(X[:59], y[:59], np.random.default_rng(0))
     one, two = (tree.condition(X, y, np.random.default_rng(1), p) for p in (old, None))

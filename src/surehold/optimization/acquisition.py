@@ -92,10 +92,9 @@ class Acquisition:
         """Return the values (q,) at points U (q, d) of the unit cube."""
         return self._evaluate(U, False)[0]
 
-    def with_gradient(self, u: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        """Return the value and its gradient (d,) at one point u (d,)."""
-        value, gradient = self._evaluate(u[None, :], True)
-        return float(value[0]), gradient[0]
+    def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the values (q,) and their gradients (q, d) at points U (q, d)."""
+        return self._evaluate(U, True)
 
     def _evaluate(self, U: NDArray[np.float64], gradient: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         q, d = U.shape

@@ -111,6 +111,7 @@ class Goal:
         best, anchors = self._incumbent(posterior, tried, observed)
         if len(pending):
             posterior = posterior.with_pending(pending)
+            best = np.maximum(best, self._believed(posterior, pending))
         d = tried.shape[1]
         if self.risk.name == "worst":
             bound = WorstCaseBound(posterior, self.accurate, self.kappa)
@@ -122,7 +123,8 @@ class Goal:
             return np.concatenate([self._looks(posterior, found[0]), found])
         if self.criterion.scale == "exact":
             margin = self.margin
-            if not (self.thesis or self.noisy or (len(tried) + len(failed) + len(pending)) % _POLISH == 0):
+            polish = (len(tried) + len(failed)) % _POLISH == 0 and not len(pending)
+            if not (self.thesis or self.noisy or polish):
                 margin = _WORTHWHILE * _spread(observed)
             accurate = coarse = self._acquisition(posterior, Perturbations(exact(d)), best, margin)
         else:
@@ -194,6 +196,17 @@ class Goal:
             return float(self._risk(posterior, 0.0).expectation(anchors[:1])[0]), anchors
         best = self.accurate.outcome(posterior, anchors[:1]).mean  # (m, 1)
         return best if self.criterion.scale == "robust" else float(best.mean()), anchors
+
+    def _believed(self, posterior: Posterior, pending: NDArray[np.float64]) -> Any:
+        """Return the best value that trials under way (p, d) are believed to give, on the criterion's scale.
+
+        Without it a second trial would be sent to the top on which the first one is on its way.
+        """
+        if self.risk.name != "mean":
+            return self._risk(posterior, 0.0).expectation(pending).max()
+        perturbations = Perturbations(exact(pending.shape[1])) if self.criterion.scale == "exact" else self.accurate
+        mean = perturbations.outcome(posterior, pending).mean  # (m, p)
+        return mean.mean(axis=0).max() if self.criterion.scale == "unscented" else mean.max(axis=1, keepdims=True)
 
     def _acquisition(self, posterior: Posterior, perturbations: Perturbations, best: Any, margin: float) -> Acquisition:
         return Acquisition(posterior, self.criterion, perturbations, best, margin=margin, kappa=self.kappa)

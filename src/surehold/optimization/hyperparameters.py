@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
+from surehold.optimization.elliptical_slice_sampling import elliptical_slice_sample
 from surehold.optimization.likelihood import Evidence, log_posterior, log_posterior_and_gradient
 from surehold.optimization.slice_sampling import slice_sample
 
@@ -19,6 +20,8 @@ __all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "mode"]
 
 _STARTS = (-2.0, -1.0, 0.0, 1.0)  # common length-scale of the mode's first guesses, in prior standard deviations
 _CURVATURE_STEP = 0.05
+_NEAR = {"maxiter": 50, "ftol": 1e-5, "gtol": 1e-2}  # the mode guides a sampler: within 1e-3 of the top is enough
+_METHODS = ("elliptical_slice", "slice", "map")
 _REACH = 6.0  # the mode is sought within this many prior standard deviations
 
 
@@ -53,30 +56,28 @@ class Prior:
 class Learning:
     """How the hyperparameters are learnt.
 
-    `method` "slice" keeps `particles` states of a slice sampler after `burn_in` sweeps, one every `thin` sweeps;
-    "map" keeps the mode alone. The chain starts at the mode, or, with `start` "previous" (thesis), at the last
-    particle of the step before, or at log theta = 1 where there is none. `width` is the sampler's first guess of a
-    slice's width; None takes three standard deviations of the density at the start, from its curvature there.
+    `method` "elliptical_slice" (default) and "slice" keep `particles` states of a slice sampler after `burn_in` steps,
+    one every `thin` steps; "map" keeps the mode alone. An elliptical step moves all hyperparameters together, starting
+    at the mode and guided by the curvature there. A step of "slice" (the thesis) moves one after the other, with a
+    first guess `width` of every slice's width; its chain starts at the last particle of the posterior before, or at
+    log theta = 1 where there is none.
     """
 
-    method: Literal["slice", "map"] = "slice"
+    method: Literal["elliptical_slice", "slice", "map"] = "elliptical_slice"
     particles: int = 10
-    burn_in: int = 5
-    thin: int = 1
-    width: float | None = None
-    start: Literal["mode", "previous"] = "mode"
+    burn_in: int = 4
+    thin: int = 2
+    width: float = 6.0
 
     def __post_init__(self) -> None:
-        if self.method not in ("slice", "map"):
-            raise unknown_name("learning method", self.method, ("slice", "map"))
-        if self.start not in ("mode", "previous"):
-            raise unknown_name("start of the chain", self.start, ("mode", "previous"))
+        if self.method not in _METHODS:
+            raise unknown_name("learning method", self.method, _METHODS)
         for name, least in (("particles", 1), ("burn_in", 0), ("thin", 1)):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
                 raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
-        if self.width is not None and not (np.isfinite(self.width) and self.width > 0.0):
-            raise InputError(f"width is {self.width!r}; give a positive finite number, or None.")
+        if not (np.isfinite(self.width) and self.width > 0.0):
+            raise InputError(f"width is {self.width!r}; give a positive finite number.")
 
 
 class Learnt(NamedTuple):
@@ -93,40 +94,36 @@ def learn(
 ) -> Learnt:
     """Draw particles of the posterior of theta given the evidence.
 
-    `previous` (p,) is the last particle of the step before, used where `learning.start` says so.
+    `previous` (p,) is the last particle of the posterior before, from which "slice" goes on.
     """
-    evaluations = 0
-    if learning.start == "previous" and learning.method == "slice":
+    counts = {"keep": learning.particles, "burn_in": learning.burn_in, "thin": learning.thin}
+    if learning.method == "slice":
         start = np.ones(evidence.prior_mean.size) if previous is None else previous
-    else:
-        start, evaluations = mode(evidence)
+        samples = slice_sample(log_posterior, evidence, start, rng, widths=learning.width, **counts)
+        return Learnt(samples.states, samples.evaluations)
+    center, evaluations = mode(evidence)
     if learning.method == "map":
-        return Learnt(start[None, :], evaluations)
-    samples = slice_sample(
-        log_posterior,
-        evidence,
-        start,
-        rng,
-        keep=learning.particles,
-        burn_in=learning.burn_in,
-        thin=learning.thin,
-        widths=_widths(evidence, start) if learning.width is None else learning.width,
-    )
-    return Learnt(samples.states, evaluations + samples.evaluations)
+        return Learnt(center[None, :], evaluations)
+    root = _root_of_covariance(evidence, center)
+    samples = elliptical_slice_sample(log_posterior, evidence, center, root, rng, **counts)
+    return Learnt(samples.states, evaluations + center.size + 1 + samples.evaluations)
 
 
-def _widths(evidence: Evidence, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return three standard deviations (p,) of the density along each coordinate, from its curvature at theta (p,)."""
-    widths = np.empty_like(theta)
-    for i in range(theta.size):
-        step = np.zeros_like(theta)
+def _root_of_covariance(evidence: Evidence, center: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return R (p, p) such that R R' is about the covariance of theta, from the curvature at the mode (p,)."""
+    p = center.size
+    level = log_posterior_and_gradient(center, evidence)[1]
+    precision = np.empty((p, p))
+    for i in range(p):
+        step = np.zeros(p)
         step[i] = _CURVATURE_STEP
-        rise = log_posterior_and_gradient(theta + step, evidence)[1][i]
-        fall = log_posterior_and_gradient(theta - step, evidence)[1][i]
-        curvature = (fall - rise) / (2.0 * _CURVATURE_STEP)
-        narrowest = 1.0 / evidence.prior_deviation[i] ** 2  # no density is wider than its prior
-        widths[i] = 3.0 / np.sqrt(max(curvature, narrowest))
-    return widths
+        precision[i] = (level - log_posterior_and_gradient(center + step, evidence)[1]) / _CURVATURE_STEP
+    deviation = evidence.prior_deviation
+    scaled = 0.5 * (precision + precision.T) * np.outer(deviation, deviation)
+    if not np.all(np.isfinite(scaled)):
+        return np.diag(deviation)
+    values, vectors = np.linalg.eigh(scaled)
+    return deviation[:, None] * vectors / np.sqrt(np.maximum(values, 1.0))  # nothing is wider than its prior
 
 
 def from_prior(evidence: Evidence, particles: int, rng: np.random.Generator) -> Learnt:
@@ -155,6 +152,6 @@ def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
         return (1e25, gradient) if value == -np.inf else (-value, -gradient)
 
     bounds = list(zip(mean - _REACH * deviation, mean + _REACH * deviation, strict=True))
-    found = minimize(negative, starts[best], jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 50})
+    found = minimize(negative, starts[best], jac=True, method="L-BFGS-B", bounds=bounds, options=_NEAR)
     theta = found.x if -found.fun > values[best] else starts[best]
     return np.ascontiguousarray(theta), len(starts) + int(found.nfev)

@@ -1,13 +1,13 @@
 """Finding the highest point of an acquisition over the unit cube."""
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.optimization.ascent import Objective, climb
+from surehold.optimization.dividing_rectangles import divide_rectangles
 from surehold.optimization.surrogate import Regions
 
-__all__ = ["Objective", "direct", "largest_holes", "multistart"]
+__all__ = ["direct", "largest_holes", "multistart"]
 
 _CANDIDATES = 256
 _HOLES = 1024
@@ -18,18 +18,6 @@ _IN_REGIONS = 512  # candidates shared out to the regions, where there are sever
 _STARTS_IN_REGIONS = 6
 _LOCAL_TRIALS = 5
 _LOCAL_SCALE = 0.05
-
-
-class Objective(Protocol):
-    """Something to maximize over the unit cube, with gradients."""
-
-    def __call__(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return values (q,) at points (q, d)."""
-        ...
-
-    def with_gradient(self, u: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        """Return value and gradient (d,) at one point (d,)."""
-        ...
 
 
 def multistart(
@@ -70,8 +58,8 @@ def multistart(
     if len(regions.lower) > 1:  # the best candidate of each of the best regions, then the best ones wherever they are
         leaders = np.sort(np.unique(home, return_index=True)[1])[:_STARTS_IN_REGIONS]
         starts = sorted({*leaders.tolist(), *starts})
-    ascents = [_ascend(objective, points[i], box=(regions.lower[home[i]], regions.upper[home[i]])) for i in starts]
-    return np.concatenate([_best_first(ascents), points])
+    tops, values = climb(objective, points[starts], regions.lower[home[starts]], regions.upper[home[starts]])
+    return np.concatenate([tops[np.argsort(-values, kind="stable")], points])
 
 
 def direct(
@@ -84,26 +72,17 @@ def direct(
     """Return points (c, d) worth trying, best first, found as the thesis does.
 
     DIRECT with 500 d evaluations in each of the regions (None: in the cube), a tenth of them for a local polish, then
-    local trials around the incumbent (d,) over the whole cube. The local search is L-BFGS-B.
+    local trials around the incumbent (d,) over the whole cube. The local search climbs the gradient.
     """
-    from scipy.optimize import direct
-
+    lower, upper = regions or Regions.whole(dimension)
     budget = 500 * dimension
-    ascents = []
-    for lower, upper in zip(*(regions or Regions.whole(dimension)), strict=True):
-        found = direct(
-            lambda u: -float(objective(u[None, :])[0]),
-            list(zip(lower, upper, strict=True)),
-            maxfun=budget - budget // 10,
-            maxiter=budget,
-            vol_tol=0.0,
-            len_tol=0.0,
-        )
-        ascents.append(_ascend(objective, found.x, budget // 10, (lower, upper)))
-    for _ in range(_LOCAL_TRIALS):
-        start = np.clip(incumbent + _LOCAL_SCALE * rng.standard_normal(dimension), 0.0, 1.0)
-        ascents.append(_ascend(objective, start, budget // 10))
-    return _best_first(ascents)
+    found = divide_rectangles(objective, lower, upper, budget - budget // 10)
+    around = incumbent + _LOCAL_SCALE * rng.standard_normal((_LOCAL_TRIALS, dimension))
+    starts = np.concatenate([found, np.clip(around, 0.0, 1.0)])
+    low = np.concatenate([lower, np.zeros_like(around)])
+    high = np.concatenate([upper, np.ones_like(around)])
+    tops, values = climb(objective, starts, low, high, budget // 10)
+    return tops[np.argsort(-values, kind="stable")]
 
 
 def largest_holes(points: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
@@ -118,34 +97,6 @@ def largest_holes(points: NDArray[np.float64], rng: np.random.Generator) -> NDAr
     centers = qmc.Sobol(points.shape[1], rng=rng).random(_HOLES)
     radius = np.minimum(KDTree(points).query(centers)[0], 2.0 * np.minimum(centers, 1.0 - centers).min(axis=1))
     return centers[np.argsort(-radius, kind="stable")]
-
-
-def _best_first(ascents: list[tuple[NDArray[np.float64], float]]) -> NDArray[np.float64]:
-    order = np.argsort([-value for _, value in ascents], kind="stable")
-    return np.array([ascents[i][0] for i in order])
-
-
-def _ascend(
-    objective: Objective,
-    start: NDArray[np.float64],
-    evaluations: int = 40,
-    box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
-) -> tuple[NDArray[np.float64], float]:
-    from scipy.optimize import minimize
-
-    def negative(u: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        value, gradient = objective.with_gradient(u)
-        return (-value, -gradient) if np.isfinite(value) else (1e25, np.zeros_like(gradient))
-
-    found = minimize(
-        negative,
-        start,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=[(0.0, 1.0)] * len(start) if box is None else list(zip(*box, strict=True)),
-        options={"maxfun": evaluations, "maxiter": evaluations},
-    )
-    return found.x, -float(found.fun)
 
 
 def _regions_of(points: NDArray[np.float64], regions: Regions) -> NDArray[np.intp]:

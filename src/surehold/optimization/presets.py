@@ -76,7 +76,7 @@ class Thesis(NamedTuple):
             ratio=self.ratio,
             standardize=False,
             prior=Prior(log_length_scale=(1.0, 10.0)),
-            learning=Learning(particles=10, burn_in=100, width=6.0, start="previous"),
+            learning=Learning("slice", particles=10, burn_in=100, thin=1, width=6.0),
         )
 
 

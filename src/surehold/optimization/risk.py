@@ -8,6 +8,7 @@ Legend
     beta      standard deviations taken off the mean, or added to and taken off the model's mean in the worst case
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -110,12 +111,9 @@ class RiskImprovement:
         gain = np.maximum(rho - self._best, 0.0).mean(axis=0)
         return np.where(gain > 0.0, gain, np.minimum(rho.max(axis=0) - self._best, 0.0))
 
-    def with_gradient(self, u: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        """Return value and gradient (d,) at u (d,), by central differences on common random numbers."""
-        steps = _STEP * np.eye(len(u))
-        values = self(np.concatenate([u[None, :], u + steps, u - steps]))
-        d = len(u)
-        return float(values[0]), (values[1 : d + 1] - values[d + 1 :]) / (2.0 * _STEP)
+    def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return values (q,) and gradients (q, d) at U (q, d), by central differences on common random numbers."""
+        return _by_differences(self, U)
 
 
 class WorstCaseBound:
@@ -134,12 +132,9 @@ class WorstCaseBound:
         """Return the bound (q,) at U (q, d)."""
         return self._bounds(U, self._kappa).min(axis=1)
 
-    def with_gradient(self, u: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        """Return the bound and its gradient (d,) at u (d,), by central differences."""
-        steps = _STEP * np.eye(len(u))
-        values = self(np.concatenate([u[None, :], u + steps, u - steps]))
-        d = len(u)
-        return float(values[0]), (values[1 : d + 1] - values[d + 1 :]) / (2.0 * _STEP)
+    def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the bounds (q,) and their gradients (q, d) at U (q, d), by central differences."""
+        return _by_differences(self, U)
 
     def weakest(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the perturbed points (s, d) of u (d,), inside the cube, the one with the lowest lower bound first."""
@@ -152,3 +147,15 @@ class WorstCaseBound:
         mean = moments.mean.mean(axis=0)
         variance = moments.variance.mean(axis=0) + moments.mean.var(axis=0)
         return (mean + kappa * np.sqrt(variance)).reshape(len(U), -1)
+
+
+def _by_differences(
+    objective: Callable[[NDArray[np.float64]], NDArray[np.float64]], U: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return values (q,) and gradients (q, d) at U (q, d)."""
+    q, d = U.shape
+    steps = _STEP * np.eye(d)
+    around = (U[:, None, :] + np.concatenate([steps, -steps])).reshape(-1, d)
+    values = objective(np.concatenate([U, around]))
+    sides = values[q:].reshape(q, 2, d)
+    return values[:q], (sides[:, 0] - sides[:, 1]) / (2.0 * _STEP)

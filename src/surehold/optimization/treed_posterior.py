@@ -54,14 +54,12 @@ class TreedPosterior:
             return self.leaves[0].average(queries, offsets, weights, gradient, slopes)
         q, d = queries.shape
         points = queries[:, None, :] + offsets
-        if q == 1:  # a step of an ascent, most often well inside a leaf: no bookkeeping
-            home = self.partition.route(points[0])
-            if (home == home[0]).all():
-                return self.leaves[home[0]].average(queries, offsets, weights, gradient, slopes)
         m = len(self.leaves[0].hyperparameters.theta)
         mean, variance = np.zeros((m, q)), np.zeros((m, q))
         by_mean, by_variance = np.zeros((m, q, d)), np.zeros((m, q, d))
         for rows, leaf, columns in self._pieces(points):
+            if len(rows) == q and len(columns) == len(weights):  # all in one leaf
+                return self.leaves[leaf].average(queries, offsets, weights, gradient, slopes)
             own = offsets[columns] if offsets.ndim == 2 else offsets[rows][:, columns]
             tilt = slopes
             if slopes is not None:
@@ -110,6 +108,11 @@ class TreedPosterior:
         """Take points (q, s, d) apart: queries (rows) of which the same points (columns) fall into the same leaf."""
         q, s, d = points.shape
         home = self.partition.route(points.reshape(-1, d)).reshape(q, s)
+        if (home == home[:, :1]).all():  # no query is split, as ever where inputs are exact
+            every = np.arange(s)
+            for leaf in np.unique(home[:, 0]):
+                yield np.flatnonzero(home[:, 0] == leaf), int(leaf), every
+            return
         together = home[:, :, None] == home[:, None, :]  # (q, s, s)
         rows, first = np.nonzero(together.argmax(axis=2) == np.arange(s))  # a query's first point in each of its leaves
         masks, leaves = together[rows, first], home[rows, first]

@@ -1,0 +1,155 @@
+"""DIRECT: maximization without gradients by dividing rectangles, in several regions together (compiled in part).
+
+Legend
+    r       regions, each a box with a search of its own
+    level   how often a side of a rectangle was cut into three: its length is 3^-level of the region's, (d,)
+    size    of a rectangle: the length of its longest side
+
+Jones, Perttunen and Stuckman 1993, in the locally biased form of Gablonsky and Kelley 2001: size is the longest side,
+and of the rectangles of one size only the best is divided. SciPy's routine asks for one value at a time; here one call
+of the objective serves all rectangles divided in a round, in all regions.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["divide_rectangles"]
+
+_DEEPEST: Final = 40  # levels of a side; 3^-40 is beyond double precision
+_WORTHWHILE: Final = 1e-4  # Jones' epsilon: least relative gain that a divided rectangle must promise
+_LOWEST: Final = -1e300  # stands for values that are not finite
+
+
+@njit(cache=True)
+def _chosen(sizes, values, count, best_of, chosen):
+    """Fill `chosen` with the rectangles to be divided, largest first; return their number.
+
+    sizes (c,), the least level of each, and values (c,), of which the first `count` are in use; best_of is work space.
+    """
+    best_of[:] = -1
+    top = -np.inf
+    for i in range(count):
+        level = sizes[i]
+        top = max(top, values[i])
+        if level < best_of.size and (best_of[level] < 0 or values[i] > values[best_of[level]]):
+            best_of[level] = i
+    found = 0
+    for a in range(best_of.size):
+        if best_of[a] < 0:
+            continue
+        size, value = 3.0**-a, values[best_of[a]]
+        slope_up, slope_down = np.inf, 0.0  # slopes k for which value + k size is the highest of all
+        for b in range(best_of.size):
+            if b == a or best_of[b] < 0:
+                continue
+            slope = (value - values[best_of[b]]) / (3.0**-b - size)
+            if b < a:  # larger ones limit k from above
+                slope_up = min(slope_up, slope)
+            else:
+                slope_down = max(slope_down, slope)
+        if slope_down > slope_up:
+            continue
+        if slope_up < np.inf and value + slope_up * size < top + _WORTHWHILE * abs(top):
+            continue
+        chosen[found] = best_of[a]
+        found += 1
+    return found
+
+
+@njit(cache=True)
+def _propose(centers, levels, sizes, values, counts, budget, best_of, chosen, points, owners):
+    """Fill points (k, d) with both children along every longest side of the chosen rectangles of every region.
+
+    owners (k, 3): region, parent and side of each. Returns the number of points.
+    """
+    d = centers.shape[2]
+    total = 0
+    for r in range(counts.size):
+        count = counts[r]
+        left = budget - count
+        for c in range(_chosen(sizes[r], values[r], count, best_of, chosen)):
+            parent = chosen[c]
+            shortest = sizes[r, parent]
+            sides = 0
+            for k in range(d):
+                sides += levels[r, parent, k] == shortest
+            if 2 * sides > left:
+                continue
+            left -= 2 * sides
+            for k in range(d):
+                if levels[r, parent, k] == shortest:
+                    step = 3.0 ** -(shortest + 1.0)
+                    for sign in range(2):
+                        points[total] = centers[r, parent]
+                        points[total, k] += step if sign else -step
+                        owners[total, 0], owners[total, 1], owners[total, 2] = r, parent, k
+                        total += 1
+    return total
+
+
+@njit(cache=True)
+def _divide(centers, levels, sizes, values, counts, points, owners, found, total):
+    """Add the points (k, d) with their values `found` (k,) as rectangles; the best sides stay longest."""
+    d = centers.shape[2]
+    start = 0
+    while start < total:
+        r, parent = owners[start, 0], owners[start, 1]
+        stop = start
+        while stop < total and owners[stop, 0] == r and owners[stop, 1] == parent:
+            stop += 2
+        used = np.zeros(d, dtype=np.bool_)
+        for _ in range((stop - start) // 2):
+            best, pair = -np.inf, -1
+            for i in range(start, stop, 2):
+                value = max(found[i], found[i + 1])
+                if not used[owners[i, 2]] and (pair < 0 or value > best):
+                    best, pair = value, i
+            side = owners[pair, 2]
+            used[side] = True
+            levels[r, parent, side] += 1
+            for i in range(pair, pair + 2):
+                n = counts[r]
+                centers[r, n] = points[i]
+                levels[r, n] = levels[r, parent]
+                sizes[r, n] = levels[r, n].min()
+                values[r, n] = found[i]
+                counts[r] += 1
+        sizes[r, parent] = levels[r, parent].min()
+        start = stop
+
+
+def divide_rectangles(
+    objective: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    evaluations: int,
+) -> NDArray[np.float64]:
+    """Return the highest point found in each box [lower, upper] (r, d), with up to `evaluations` evaluations each."""
+    regions, d = lower.shape
+    width = upper - lower
+    centers = np.full((regions, evaluations, d), 0.5)
+    levels = np.zeros((regions, evaluations, d), dtype=np.int64)
+    sizes = np.zeros((regions, evaluations), dtype=np.int64)
+    values = np.full((regions, evaluations), -np.inf)
+    counts = np.ones(regions, dtype=np.int64)
+    best_of, chosen = np.empty(_DEEPEST, dtype=np.int64), np.empty(_DEEPEST, dtype=np.int64)
+    points = np.empty((2 * d * _DEEPEST * regions, d))
+    owners = np.empty((len(points), 3), dtype=np.int64)
+    values[:, 0] = _finite(objective(lower + 0.5 * width))
+    while True:
+        total = _propose(centers, levels, sizes, values, counts, evaluations, best_of, chosen, points, owners)
+        if total == 0:
+            break
+        home = owners[:total, 0]
+        found = _finite(objective(lower[home] + width[home] * points[:total]))
+        _divide(centers, levels, sizes, values, counts, points, owners, found, total)
+    best = values.argmax(axis=1)
+    return lower + width * centers[np.arange(regions), best]
+
+
+def _finite(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(np.isfinite(values), values, _LOWEST)
