@@ -171,6 +171,37 @@ def test_pending_trials_leave_every_particles_mean_alone(data, learnt):
     assert np.all(found.moments(data[2]).variance <= learnt.moments(data[2]).variance + 1e-9)
 
 
+def test_a_thinned_posterior_is_that_of_its_particles(data, learnt):
+    few, all_ = learnt.thinned(3).moments(data[2], gradient=True), learnt.moments(data[2], gradient=True)
+    for one, whole in zip(few, all_, strict=True):
+        np.testing.assert_array_equal(one, whole[::3])
+
+
+def test_hyperparameters_are_learnt_from_the_first_trials_until_later_ones_contradict():
+    rng = np.random.default_rng(11)
+    X = rng.random((71, 1))
+    y = np.sin(6 * X[:, 0])
+    model = GaussianProcess()
+    learnt = [model.condition(X[:n], y[:n], np.random.default_rng(0)).hyperparameters.theta for n in (68, 71)]
+    np.testing.assert_array_equal(learnt[0], learnt[1])
+    fresh = GaussianProcess().condition(X, y, np.random.default_rng(0))
+    np.testing.assert_array_equal(fresh.hyperparameters.theta, learnt[1])
+    assert fresh.surprise(68) < 4.0
+    y[69] += 1.0
+    contradicted = GaussianProcess().condition(X, y, np.random.default_rng(0))
+    assert not np.array_equal(contradicted.hyperparameters.theta, learnt[1])
+    np.testing.assert_allclose(contradicted.moments(X).mean, np.broadcast_to(y, (10, 71)), atol=1e-3)
+
+
+def test_surprise_counts_standard_deviations(data):
+    X, y, _ = data
+    fixed = {"length_scales": [0.3, 0.6], "signal_variance": 1.3, "standardize": False, "noise": 0.1}
+    before = GaussianProcess(**fixed).fit(X[:-1], y[:-1]).posterior.moments(X[-1:])
+    after = GaussianProcess(**fixed).fit(X, y).posterior
+    expected = abs(y[-1] - before.mean[0, 0]) / np.sqrt(before.variance[0, 0] + 0.01)
+    assert after.surprise(len(y) - 1) == pytest.approx(expected, rel=1e-4)
+
+
 def test_learns_the_length_scales_of_a_known_process():
     rng = np.random.default_rng(7)
     X = rng.random((150, 2))

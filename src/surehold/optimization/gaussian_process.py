@@ -3,7 +3,9 @@
 What is learnt is a `GaussianProcessPosterior`; the formulas of its predictions are in `prediction`.
 """
 
+from collections import OrderedDict
 from collections.abc import Sequence
+from hashlib import sha256
 from math import log, sqrt
 from typing import Final, Literal, get_args
 
@@ -13,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.gaussian_process_posterior import GaussianProcessPosterior
 from surehold.optimization.heteroscedastic import most_likely_noise
-from surehold.optimization.hyperparameters import Learning, Prior, from_prior, learn, mode
+from surehold.optimization.hyperparameters import Learning, Learnt, Prior, from_prior, learn, mode
 from surehold.optimization.kernels import kernel_number
 from surehold.optimization.likelihood import Evidence, log_posterior
 from surehold.optimization.outputs import Standardization, checked_range
@@ -24,6 +26,8 @@ __all__ = ["NOISES", "GaussianProcess", "NoiseName"]
 
 NoiseName = Literal["none", "inferred", "heteroscedastic"]
 NOISES: Final = get_args(NoiseName)
+_REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
+_SURPRISE: Final = 4.0  # standard deviations by which a trial may miss its prediction before all is learnt anew
 _LOUDEST: Final = 1e100  # standard deviation of the noise, in those of the outputs; its square stays finite
 
 
@@ -110,6 +114,7 @@ class GaussianProcess:
         if self._length_scales is not None and not np.all((self._length_scales > 0) & np.isfinite(self._length_scales)):
             raise InputError(f"length_scales are {length_scales!r}; give positive finite numbers, one a dimension.")
         self._posterior: GaussianProcessPosterior | None = None
+        self._learnt: OrderedDict[bytes, tuple[Standardization, Learnt]] = OrderedDict()  # saves time, changes nothing
 
     def condition(
         self,
@@ -121,11 +126,43 @@ class GaussianProcess:
     ) -> GaussianProcessPosterior:
         """Learn the hyperparameters from X (n, d) in the unit cube and finite y (n,), n >= 1.
 
-        `previous` is the posterior of the step before; its last particle starts the chain where the learning says so.
+        From 32 trials on they are learnt from the first k of them, n - n/16 < k <= n, unless the later trials
+        contradict what was learnt: k, and all that follows, depend on the trials and `rng` alone, and one more trial
+        seldom costs a new learning.
+        `previous` is the posterior of the step before; its last particle starts the chains of the learning "slice".
         `noise` (n,) are known standard deviations of the observations, in the outputs' units, in place of the setting.
         """
-        last = previous.hyperparameters.theta[-1] if isinstance(previous, GaussianProcessPosterior) else None
-        return self.condition_on_blocks(X, y, rng, self.standardization(y), start=last, noise=noise)
+        if self._learning.method == "slice" or self._length_scales is not None or self._noise == "heteroscedastic":
+            last = previous.hyperparameters.theta[-1] if isinstance(previous, GaussianProcessPosterior) else None
+            return self.condition_on_blocks(X, y, rng, self.standardization(y), start=last, noise=noise)
+        n, stream = len(y), int(rng.integers(2**63))
+        k = n - n % (1 << max(0, n.bit_length() - 5))
+        posterior = self._learnt_from(k, X, y, noise, stream)
+        if k < n and (posterior.outputs.flat or posterior.surprise(k) > _SURPRISE):
+            posterior = self._learnt_from(n, X, y, noise, stream)
+        return posterior
+
+    def _learnt_from(
+        self, k: int, X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, stream: int
+    ) -> GaussianProcessPosterior:
+        """Return the posterior given all trials, with hyperparameters that were learnt from the first k of them."""
+        key = fingerprint(X[:k], y[:k], None if noise is None else noise[:k], stream)
+        if key not in self._learnt:
+            outputs = self.standardization(y[:k])
+            evidence = self._evidence(X[:k], y[:k], outputs, [k], (1.0,), None if noise is None else noise[:k])
+            self._learnt[key] = outputs, self._learn(evidence, outputs, np.random.default_rng([stream, k]), None)
+            while len(self._learnt) > _REMEMBERED:
+                self._learnt.popitem(last=False)
+        outputs, (particles, cost) = self._learnt[key]
+        evidence = self._evidence(X, y, outputs, [len(y)], (1.0,), noise)
+        return GaussianProcessPosterior(evidence, particles, outputs, cost)
+
+    def _learn(
+        self, evidence: Evidence, outputs: Standardization, rng: np.random.Generator, start: NDArray[np.float64] | None
+    ) -> Learnt:
+        if outputs.flat and self._standardize:
+            return from_prior(evidence, self._learning.particles, rng)
+        return learn(evidence, self._learning, rng, start)
 
     def standardization(self, y: NDArray[np.float64]) -> Standardization:
         """Return the map of outputs y (n,) to the scale on which this process learns."""
@@ -171,11 +208,7 @@ class GaussianProcess:
             if self._noise == "heteroscedastic" and noise is None and not outputs.flat:
                 variances, log_noise = most_likely_noise(evidence)
                 evidence = evidence._replace(noise=variances)
-            if outputs.flat and self._standardize:
-                learnt = from_prior(evidence, self._learning.particles, rng)
-            else:
-                learnt = learn(evidence, self._learning, rng, start)
-            particles, cost = learnt
+            particles, cost = self._learn(evidence, outputs, rng, start)
         return GaussianProcessPosterior(evidence.first_block(), particles, outputs, cost, log_noise=log_noise)
 
     def log_evidence(
@@ -312,3 +345,11 @@ def _positive(name: str, value: float) -> float:
     if not (np.isfinite(value) and value > 0.0):
         raise InputError(f"{name} is {value!r}; give a positive finite number.")
     return float(value)
+
+
+def fingerprint(X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, *others) -> bytes:
+    """Return a digest of trials and of other settings that have a faithful `repr`."""
+    content = sha256(repr((X.shape, noise is None, others)).encode())
+    for array in (X, y) if noise is None else (X, y, noise):
+        content.update(np.ascontiguousarray(array).tobytes())
+    return content.digest()

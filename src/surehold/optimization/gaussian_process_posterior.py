@@ -31,6 +31,17 @@ class Hyperparameters(NamedTuple):
     """learnt noise variances in standardized units, (m,)"""
 
 
+class Factors(NamedTuple):
+    """What every prediction needs of the data's covariance A = L L' under each particle."""
+
+    inverse_L: NDArray[np.float64]
+    """(m, n, n)"""
+    alpha: NDArray[np.float64]
+    """A^-1 y, (m, n)"""
+    repaired: int
+    """factorizations that needed a larger nugget than asked for"""
+
+
 class GaussianProcessPosterior:
     """A Gaussian process conditioned on trials, a mixture over the particles of its hyperparameters.
 
@@ -47,6 +58,7 @@ class GaussianProcessPosterior:
         cost: int,
         Y: NDArray[np.float64] | None = None,
         log_noise: "GaussianProcessPosterior | None" = None,
+        factors: Factors | None = None,
     ):
         m, d = len(theta), evidence.X.shape[1]
         n = len(evidence.X)
@@ -60,8 +72,14 @@ class GaussianProcessPosterior:
             np.exp(theta[:, -1]) if evidence.learn_noise else np.zeros(m),
         )
         self._Y: Final = np.ascontiguousarray(np.broadcast_to(evidence.y, (m, n)) if Y is None else Y)
-        self._inverse_L: Final = np.empty((m, n, n))
-        self._alpha: Final = np.empty((m, n))
+        self._factors: Final = factors or self._factorized()
+        self.diagnostics: Final = FitDiagnostics(n, cost, self._factors.repaired, outputs.flat)
+        self.regions: Final = Regions.whole(d)
+
+    def _factorized(self) -> Factors:
+        evidence = self.evidence
+        m, n = self._Y.shape
+        inverse_L, alpha = np.empty((m, n, n)), np.empty((m, n))
         repaired = factorize(
             evidence.X,
             self._Y,
@@ -72,13 +90,29 @@ class GaussianProcessPosterior:
             evidence.ratio,
             evidence.mean_variance,
             evidence.kernel,
-            self._inverse_L,
-            self._alpha,
+            inverse_L,
+            alpha,
         )
         if repaired < 0:
             raise SureholdError("the covariance of the trials could not be factorized; are outputs of sane size?")
-        self.diagnostics: Final = FitDiagnostics(n, cost, repaired, outputs.flat)
-        self.regions: Final = Regions.whole(d)
+        return Factors(inverse_L, alpha, repaired)
+
+    def surprise(self, k: int) -> float:
+        """Return how much the trials after the first k contradict the particles, in standard deviations.
+
+        That is the largest miss of a trial, predicted from those before it, by the particle that misses least; or
+        infinity, where these trials are so much likelier under some particles that less than a quarter of all count
+        (effective sample size, Kong 1992).
+        """
+        z = np.einsum(
+            "mij,mj->mi", self._factors.inverse_L[:, k:], self._Y
+        )  # (m, n - k), standard normal if all is well
+        diagonal = np.diagonal(self._factors.inverse_L, axis1=1, axis2=2)[:, k:]
+        logs = (np.log(diagonal) - 0.5 * z * z).sum(axis=1)
+        weights = np.exp(logs - logs.max())
+        if weights.sum() ** 2 < 0.25 * len(weights) * np.square(weights).sum():
+            return float("inf")
+        return float(np.abs(z).min(axis=0).max())
 
     @property
     def length_scales(self) -> NDArray[np.float64]:
@@ -109,8 +143,8 @@ class GaussianProcessPosterior:
             self.hyperparameters.s2,
             self.evidence.mean_variance,
             self.evidence.kernel,
-            self._inverse_L,
-            self._alpha,
+            self._factors.inverse_L,
+            self._factors.alpha,
             gradient,
         )
         scale = self.outputs.scale
@@ -135,10 +169,27 @@ class GaussianProcessPosterior:
             self.hyperparameters.s2,
             self.evidence.mean_variance,
             self.evidence.kernel,
-            self._inverse_L,
-            self._alpha,
+            self._factors.inverse_L,
+            self._factors.alpha,
         )
         return self.outputs.shift + self.outputs.scale * draws
+
+    def thinned(self, count: int) -> "GaussianProcessPosterior":
+        """Return the posterior of about `count` of the particles: a cheaper approximation."""
+        every = slice(0, None, max(1, len(self._Y) // count))
+        return GaussianProcessPosterior(
+            self.evidence,
+            self.hyperparameters.theta[every],
+            self.outputs,
+            self.diagnostics.evaluations,
+            self._Y[every],
+            self.log_noise,
+            Factors(
+                np.ascontiguousarray(self._factors.inverse_L[every]),
+                np.ascontiguousarray(self._factors.alpha[every]),
+                self._factors.repaired,
+            ),
+        )
 
     def with_pending(self, X: NDArray[np.float64]) -> "GaussianProcessPosterior":
         """Return the posterior as if each particle's own mean had been observed at X (k, d): only variances shrink."""

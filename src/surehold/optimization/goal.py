@@ -24,6 +24,7 @@ __all__ = ["Goal"]
 
 _ANCHORS: Final = 3
 _SHORTLIST: Final = 16
+_SCREENED: Final = 3  # particles, of all, that choose where to look closer
 _PATIENCE: Final = 3
 # Improvement that is worth a trial where observations are exact, in mean absolute deviations of the outputs. Without it
 # what is left of the model's variance beside the incumbent, the nugget's, draws trial after trial to the same hill.
@@ -126,12 +127,13 @@ class Goal:
             polish = (len(tried) + len(failed)) % _POLISH == 0 and not len(pending)
             if not (self.thesis or self.noisy or polish):
                 margin = _WORTHWHILE * _spread(observed)
-            accurate = coarse = self._acquisition(posterior, Perturbations(exact(d)), best, margin)
+            reached = (Perturbations(exact(d)),) * 2
         else:
-            accurate = self._acquisition(posterior, self.accurate, best, self.margin)
-            coarse = self._acquisition(posterior, self.coarse, best, self.margin)
+            margin, reached = self.margin, (self.accurate, self.coarse)
+        accurate = self._acquisition(posterior, reached[0], best, margin)
         if self.thesis:
             return maximizer.direct(accurate, d, anchors[0], rng, posterior.regions)
+        coarse = self._acquisition(posterior.thinned(_SCREENED), reached[1], float(np.mean(best)), margin)
         found = maximizer.multistart(accurate, coarse, d, anchors, rng, posterior.regions)
         if self.criterion.scale == "robust":
             found = np.concatenate([self._looks(posterior, found[0]), found])

@@ -338,7 +338,9 @@ class Optimizer:
         if self._cache is not None and self._cache[0] == t:
             return self._cache[1]
         previous = self._cache[1] if self._goal.thesis and self._cache is not None else None
-        posterior = self._surrogate.condition(self._trials.reached, self._trials.modelled, self._rng(1, t), previous)
+        stream = t if self._goal.thesis else 0  # one stream for all: what was learnt from some trials stays as it was
+        rng = self._rng(1, stream)
+        posterior = self._surrogate.condition(self._trials.reached, self._trials.modelled, rng, previous)
         if self._lattice is not None:
             posterior = LatticePosterior(posterior, self._lattice)
         self._cache = (t, posterior)

@@ -98,6 +98,10 @@ class Posterior(Protocol):
         """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
         ...
 
+    def thinned(self, count: int) -> "Posterior":
+        """Return the posterior of about `count` of the particles, evenly taken: a cheaper approximation."""
+        ...
+
     def with_pending(self, X: NDArray[np.float64]) -> "Posterior":
         """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
         ...

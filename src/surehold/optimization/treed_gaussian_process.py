@@ -7,7 +7,6 @@ Legend (the thesis' symbols in brackets)
 """
 
 from collections import OrderedDict
-from hashlib import sha256
 from math import inf
 from typing import Final, Literal
 
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
-from surehold.optimization.gaussian_process import GaussianProcess, checked_data, checked_noise
+from surehold.optimization.gaussian_process import GaussianProcess, checked_data, checked_noise, fingerprint
 from surehold.optimization.gaussian_process_posterior import GaussianProcessPosterior
 from surehold.optimization.outputs import Standardization
 from surehold.optimization.partition import Partition, grow
@@ -158,7 +157,7 @@ class TreedGaussianProcess:
                 continue
             scaled = self._process.centered(outputs, y[own])
             known = None if noise is None else noise[own]
-            key = _fingerprint(X[own], y[own], known, scaled, [own])
+            key = fingerprint(X[own], y[own], known, scaled, [len(own)])
             if key not in self._evidences:
                 self._evidences[key] = self._process.log_evidence(X[own], y[own], scaled, known)
             self._evidences.move_to_end(key)
@@ -205,7 +204,8 @@ class TreedGaussianProcess:
         if self._continued:
             start = None if old is None else old.leaves[_nearest(partition, j, old)].hyperparameters.theta[-1]
         else:
-            key = _fingerprint(X[order], y[order], noise if noise is None else noise[order], outputs, blocks)
+            sizes = [len(block) for block in blocks]
+            key = fingerprint(X[order], y[order], noise if noise is None else noise[order], outputs, sizes)
             if key in self._learnt:
                 self._learnt.move_to_end(key)
                 return self._learnt[key]
@@ -289,17 +289,3 @@ def _nearest(partition: Partition, j: int, old: TreedPosterior) -> int:
     lower = np.maximum(old.regions.lower, partition.lower[j])
     upper = np.minimum(old.regions.upper, partition.upper[j])
     return int(np.argmax(np.prod(np.maximum(upper - lower, 0.0), axis=1)))
-
-
-def _fingerprint(
-    X: NDArray[np.float64],
-    y: NDArray[np.float64],
-    noise: NDArray[np.float64] | None,
-    outputs: Standardization,
-    blocks: list[NDArray[np.intp]],
-) -> bytes:
-    """Return a digest of all that the hyperparameters of a leaf depend on."""
-    content = sha256(repr((X.shape, [len(block) for block in blocks], outputs, noise is None)).encode())
-    for array in (X, y) if noise is None else (X, y, noise):
-        content.update(np.ascontiguousarray(array).tobytes())
-    return content.digest()

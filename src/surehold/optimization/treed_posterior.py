@@ -85,6 +85,12 @@ class TreedPosterior:
             draws[np.ix_(np.arange(m), rows, np.arange(len(normals)), columns)] = part
         return draws
 
+    def thinned(self, count: int) -> "TreedPosterior":
+        """Return the posterior of about `count` of the particles: a cheaper approximation."""
+        return TreedPosterior(
+            self.partition, tuple(leaf.thinned(count) for leaf in self.leaves), self.diagnostics.observations
+        )
+
     def with_pending(self, X: NDArray[np.float64]) -> "TreedPosterior":
         """Return the posterior as if each particle's own mean had been observed at X (k, d), in the leaf that owns it.
 
@@ -161,6 +167,10 @@ class AveragedTrees:
     def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
         return np.concatenate([tree.sample(points, normals) for tree in self.trees])
+
+    def thinned(self, count: int) -> "AveragedTrees":
+        """Return the posterior of about `count` of the particles of every tree: a cheaper approximation."""
+        return AveragedTrees(tuple(tree.thinned(count) for tree in self.trees))
 
     def with_pending(self, X: NDArray[np.float64]) -> "AveragedTrees":
         """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
