@@ -183,6 +183,11 @@ class Sampler(BaseSampler):
             raise InputError(f"study '{study.study_name}' has no finished trial yet; its parameters are not known.")
         return SearchSpace(common)
 
+    def n_initial(self, space: SearchSpace) -> int:
+        """Return the size of the initial design in a search space."""
+        given = self._settings.get("n_initial")
+        return Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given
+
     @contextmanager
     def optimizing(self, space: SearchSpace, history: History) -> Iterator[Optimizer]:
         """Lend an optimizer that has been told a history, to one thread at a time.

@@ -110,9 +110,9 @@ class SearchSpace:
         self.lattice: Final = None if smooth.all() else Lattice(self._snap, smooth)
 
     @property
-    def has_choices(self) -> bool:
-        """Whether a parameter is a choice among names."""
-        return bool(self._choices)
+    def numbers(self) -> Box | None:
+        """The box of the parameters that are numbers and can vary: those that input noise is given for."""
+        return Box({numeric.name: numeric.bounds() for _, numeric in self._numeric}) if self._numeric else None
 
     def encode(self, parameters: Mapping[str, Any]) -> NDArray[np.float64]:
         """Return the point (d,) of the box for parameters that are inside; see `check`."""
@@ -175,9 +175,9 @@ class SearchSpace:
         """
         if noise is None or self.box is None or not self._choices:
             return noise
-        if not self._numeric:
+        numbers = self.numbers
+        if numbers is None:
             raise InputError("input noise is given, but all parameters are choices, which carry none; leave it out.")
-        numbers = Box({numeric.name: numeric.bounds() for _, numeric in self._numeric})
         covariance = noise.unit_covariance(numbers)
         if np.any(covariance != np.diag(np.diag(covariance))):
             raise InputError("input noise is correlated, and some parameters are choices; give standard deviations.")

@@ -1,0 +1,189 @@
+"""The stored trials of one study: who makes each, and what came of it. Every operation is whole or did not happen."""
+
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, Final, NamedTuple
+
+from optuna.exceptions import UpdateFinishedTrialError
+from optuna.storages import BaseStorage
+from optuna.trial import FrozenTrial, TrialState, create_trial
+
+from surehold.errors import InputError
+from surehold.studies.history import REACHED
+from surehold.studies.search_space import SearchSpace
+
+__all__ = ["HOLDER", "NOTE", "PROMISE", "VETOED", "Holder", "Ledger", "Told", "answer_of", "checked_value", "holder_of"]
+
+#: Trial attributes: who makes the trial (a `Holder`), what the model expected to gain, how the trial came about, why it
+#: was forbidden.
+HOLDER: Final = "surehold:holder"
+PROMISE: Final = "surehold:promise"
+NOTE: Final = "surehold:note"
+VETOED: Final = "surehold:vetoed"
+
+_ATTEMPTS: Final = 5  # a trial that has taken so many workers with it counts as failed
+
+
+class Holder(NamedTuple):
+    """Who makes a trial."""
+
+    name: str
+    until: float | None
+    """seconds since 1970 until which the holder counts as alive; None: forever"""
+    attempts: int
+    """times that the trial was handed out"""
+
+
+@dataclass(frozen=True)
+class Told:
+    """An answer that was taken."""
+
+    id: int
+    state: str
+    """"complete" or "failed" """
+    value: float | None
+    already: bool
+    """whether the same answer had been given before"""
+
+
+class Ledger:
+    """The trials of the study `name` in a storage of Optuna, with the parameters `space`."""
+
+    def __init__(self, backend: BaseStorage, name: str, space: SearchSpace):
+        self._backend = backend
+        self._name = name
+        self._study_id = backend.get_study_id_from_name(name)
+        self._space = space
+
+    def trials(self) -> list[FrozenTrial]:
+        """Return all trials by number; not to be changed."""
+        return self._backend.get_all_trials(self._study_id, deepcopy=False)
+
+    def trial(self, id: int) -> FrozenTrial:
+        """Return one trial; raises InputError where it does not exist."""
+        if isinstance(id, bool) or not isinstance(id, int) or id < 0:
+            raise InputError(f"trial id is {id!r}; give the whole number that ask gave, 0 or more.")
+        n = self._backend.get_n_trials(self._study_id)
+        if id >= n:
+            there = f"the last one is {n - 1}" if n else "none has been asked for"
+            raise InputError(f"trial {id} is not in study '{self._name}'; {there}.")
+        return self._backend.get_trial(self._backend.get_trial_id_from_study_id_trial_number(self._study_id, id))
+
+    def store(
+        self, state: TrialState, parameters: dict[str, Any], marks: dict[str, Any], value: float | None = None
+    ) -> FrozenTrial:
+        """Store a whole trial in one operation, and return it."""
+        template = create_trial(
+            state=state, params=parameters, distributions=self._space.distributions, user_attrs=marks, value=value
+        )
+        return self._backend.get_trial(self._backend.create_new_trial(self._study_id, template_trial=template))
+
+    # --- who makes a trial ----------------------------------------------------------------------------------------
+
+    def hold(self, trial: FrozenTrial, holder: Holder) -> None:
+        """Store who makes a trial; nothing happens where it is finished by now."""
+        with suppress(UpdateFinishedTrialError):
+            self._backend.set_trial_user_attr(trial._trial_id, HOLDER, holder)
+
+    def renew(self, id: int, name: str, lifetime: float) -> None:
+        """Store that the holder of that name is alive for `lifetime` more seconds, where it still holds the trial."""
+        trial = self.trial(id)
+        holder = holder_of(trial)
+        if trial.state == TrialState.RUNNING and holder is not None and holder.name == name:
+            self.hold(trial, holder._replace(until=time.time() + lifetime))
+
+    def held(self, trials: list[FrozenTrial], name: str | None) -> FrozenTrial | None:
+        """Return the running trial that the holder of that name has, if any."""
+        running = [t for t in trials if t.state == TrialState.RUNNING]
+        return next((t for t in running if name and (h := holder_of(t)) is not None and h.name == name), None)
+
+    def orphan(self, trials: list[FrozenTrial], now: float) -> FrozenTrial | None:
+        """Return the first running trial whose holder is dead; one that has killed too many is failed instead."""
+        for trial in trials:
+            holder = holder_of(trial)
+            if trial.state != TrialState.RUNNING or holder is None or holder.until is None or now <= holder.until:
+                continue
+            if holder.attempts < _ATTEMPTS:
+                return trial
+            with suppress(UpdateFinishedTrialError):
+                note = f"{holder.attempts} workers died of it; counted as failed"
+                self._backend.set_trial_user_attr(trial._trial_id, NOTE, note)
+                self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
+        return None
+
+    # --- what came of it ------------------------------------------------------------------------------------------
+
+    def tell(self, id: int, value: Any, failed: bool, reached: Mapping[str, Any] | None) -> Told:
+        """Store an answer; see `RobotStudy.tell`."""
+        number = checked_value(value, failed)
+        trial = self.trial(id)
+        actual = None if reached is None else self._space.check(trial.params | dict(reached), "reached")
+        if trial.state == TrialState.WAITING:
+            raise InputError(f"trial {id} has not been handed out yet; ask for it first.")
+        state = "failed" if number is None else "complete"
+        if not trial.state.is_finished():
+            try:
+                if actual is not None:
+                    self._backend.set_trial_user_attr(trial._trial_id, REACHED, actual)
+                if number is None:
+                    self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
+                else:
+                    self._backend.set_trial_state_values(trial._trial_id, TrialState.COMPLETE, [number])
+                return Told(id, state, number, False)
+            except UpdateFinishedTrialError:  # somebody else was quicker
+                trial = self.trial(id)
+        before = answer_of(trial)
+        now = "failed" if number is None else f"value {number!r}"
+        elsewhere = actual is not None and actual != trial.user_attrs.get(REACHED, trial.params)
+        if before != now or elsewhere:
+            raise InputError(
+                f"trial {id} was told before: {before}; now: {now}{', reached elsewhere' * elsewhere}. The first "
+                "answer counts; add the other one as a trial of its own if it was made."
+            )
+        return Told(id, state, number, True)
+
+    def veto(self, id: int, reason: str) -> None:
+        """Store that a trial must not be made; see `RobotStudy.veto`."""
+        trial = self.trial(id)
+        try:
+            self._backend.set_trial_user_attr(trial._trial_id, VETOED, reason)
+            self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
+        except UpdateFinishedTrialError:
+            trial = self.trial(id)
+            if VETOED not in trial.user_attrs:
+                raise InputError(
+                    f"trial {id} is finished ({answer_of(trial)}); only a pending one can be vetoed."
+                ) from None
+
+
+def holder_of(trial: FrozenTrial) -> Holder | None:
+    """Return who makes a trial; None where nobody said."""
+    stored = trial.user_attrs.get(HOLDER)
+    return None if stored is None else Holder(*stored)
+
+
+def answer_of(trial: FrozenTrial) -> str:
+    """Return in words what a finished trial was told."""
+    if VETOED in trial.user_attrs:
+        return f"vetoed ({trial.user_attrs[VETOED]})"
+    return f"value {trial.values[0]!r}" if trial.state == TrialState.COMPLETE and trial.values else "failed"
+
+
+def checked_value(value: Any, failed: bool) -> float | None:
+    """Return the value of a trial, None of a failed one; raises InputError where it is not one finite number."""
+    if failed:
+        if value is not None:
+            raise InputError(f"a failed trial has no value, but {value!r} was told; leave one of the two out.")
+        return None
+    if value is None:
+        raise InputError("the trial has no value; tell one, or that it failed.")
+    try:
+        number = float("nan") if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = float("nan")
+    if not isfinite(number):
+        raise InputError(f"value is {value!r}; tell one finite number, or that the trial failed.")
+    return number

@@ -1,0 +1,132 @@
+"""The safe answer of a study, written into it: Optuna's `study.best_trial` is the highest spike that was hit.
+
+Written as the study's attribute `surehold:recommendation` and as its note, which optuna-dashboard shows.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+from optuna.study import Study
+
+from surehold.errors import InputError
+from surehold.studies.dashboard_note import read_note, write_note
+from surehold.studies.history import REACHED, history_of
+from surehold.studies.sampler import Sampler, maximizes
+
+__all__ = ["RECOMMENDATION", "StudyRecommendation", "recommend"]
+
+#: Study attribute that holds the recommendation last written.
+RECOMMENDATION: Final = "surehold:recommendation"
+_END: Final = "*Written by surehold; notes of your own below this line are kept.*"
+
+
+@dataclass(frozen=True)
+class StudyRecommendation:
+    """The parameters to use, and what to expect of them when the input is off; values in the study's direction."""
+
+    parameters: dict[str, Any]
+    trial: int
+    """number of the trial that was made there"""
+    mean: float
+    """expected outcome under the input noise"""
+    std: float
+    """standard deviation of one outcome: input noise and what the model does not know together"""
+    quantile: float
+    """value that 95 % of outcomes are better than"""
+    observed: float
+    """value that was told for the trial"""
+    highest_trial: int
+    """number of the best observed trial, Optuna's best_trial"""
+    highest_value: float
+    """its value"""
+    n: int
+    """trials with a value that the recommendation rests on"""
+    refused: str
+    """why the best observed trial is not recommended; empty where it is"""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain data."""
+        return asdict(self)
+
+
+def recommend(study: Study, sampler: Sampler | None = None) -> StudyRecommendation:
+    """Return the trial whose outcome under the input noise is expected best, and write it into the study.
+
+    Parameters
+    ----------
+    study
+        A study of Optuna.
+    sampler
+        By default the study's own.
+
+    Raises
+    ------
+    InputError
+        If the sampler is not surehold's, the study has several objectives, or no trial has given a value yet.
+    """
+    found = find_recommendation(study, sampler)
+    if study.user_attrs.get(RECOMMENDATION) != found.as_dict():
+        study.set_user_attr(RECOMMENDATION, found.as_dict())
+    backend, study_id = study._storage, study._study_id
+    before = read_note(backend, study_id)
+    note = note_of(found, study.study_name) + before.partition(_END)[2]
+    if note != before:
+        write_note(backend, study_id, note)
+    return found
+
+
+def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRecommendation:
+    """Return what `recommend` does, and write nothing."""
+    sampler = sampler or study.sampler  # type: ignore[assignment]
+    if not isinstance(sampler, Sampler):
+        raise InputError(f"the study's sampler is {sampler}; load the study with a surehold.Sampler, or give one.")
+    maximize = maximizes(study)
+    sign = 1.0 if maximize else -1.0
+    trials = study.get_trials(deepcopy=False)
+    space = sampler.search_space(study)
+    history = history_of(trials, space, maximize)
+    with sampler.optimizing(space, history) as optimizer:
+        best = optimizer.recommend()
+        told = np.flatnonzero(np.isfinite(history.y))
+        distance = np.abs(optimizer.box.to_unit(history.reached[told]) - optimizer.box.to_unit(best.x)).max(axis=1)
+    same = told[distance <= distance.min() + 1e-9]
+    row = int(same[np.argmax(history.y[same])])
+    number, highest = int(history.numbers[row]), int(history.numbers[np.nanargmax(history.y)])
+    trial = next(t for t in trials if t.number == number)
+    text = best.refused
+    if text and not maximize:
+        text = f"With all signs changed, so that larger is better: {text}"
+    return StudyRecommendation(
+        trial.params | trial.user_attrs.get(REACHED, {}),
+        number,
+        sign * best.mean,
+        best.std,
+        sign * best.quantile,
+        sign * float(history.y[row]),
+        highest,
+        sign * float(np.nanmax(history.y)),
+        best.n,
+        text if number != highest else "",
+    )
+
+
+def note_of(found: StudyRecommendation, name: str) -> str:
+    """Return the recommendation as text in Markdown."""
+    lines = [
+        f"**Recommended for {name}: trial {found.trial}**",
+        "",
+        "| parameter | value |",
+        "| --- | --- |",
+        *(f"| {key} | {_shown(value)} |" for key, value in found.parameters.items()),
+        "",
+        f"Expect {found.mean:.4g} ± {found.std:.2g} when the input is off; 95 % of executions are better than "
+        f"{found.quantile:.4g}. It gave {found.observed:.4g} when it was tried. {found.n} trials with a value.",
+    ]
+    if found.refused:
+        lines += ["", f"Not trial {found.highest_trial}, the best observed one. {found.refused}"]
+    return "\n".join([*lines, "", _END])
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,328 @@
+"""A study whose trials are made elsewhere: by a robot, a person, a worker. Ask for a trial, tell what came of it.
+
+Whatever is answered has been stored before: a trial handed out, a value taken. The first answer to a trial counts,
+whoever gives it; the same answer again is harmless, another one is refused. So an answer that comes late, from a worker
+believed dead, is accepted as long as the one that took the trial up again has not answered.
+"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import optuna
+from optuna.study import Study
+from optuna.trial import FrozenTrial, TrialState
+
+from surehold.errors import InputError, SureholdError
+from surehold.studies.history import REACHED, history_of, parameters_of
+from surehold.studies.ledger import HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
+from surehold.studies.recommendation import StudyRecommendation, recommend
+from surehold.studies.settings import SETTINGS, StudySettings
+from surehold.studies.stop_rule import StopRule
+from surehold.studies.storage import Storage, checked_name, open_storage
+
+__all__ = ["Asked", "NothingToAsk", "RobotStudy"]
+
+_PAUSED: Final = "surehold:paused"  # study attribute: why; None where it is not paused
+_STOP: Final = "surehold:stop"  # study attribute: a `StopRule`
+
+
+class NothingToAsk(SureholdError):
+    """No trial is handed out: the study is paused, or its stop rule says that it has had enough."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A trial to be made."""
+
+    id: int
+    """its number in the study, 0 for the first"""
+    parameters: dict[str, Any]
+    units: dict[str, str]
+    """unit of each parameter that has one"""
+    again: bool
+    """whether it has been handed out before"""
+
+
+class RobotStudy:
+    """A stored study, opened; see `create` and `open`.
+
+    Attributes
+    ----------
+    name : its name
+    settings : StudySettings
+    storage : Storage
+    study : the study of Optuna, with surehold's sampler
+    sampler : that sampler
+    """
+
+    def __init__(self, name: str, storage: Storage, study: Study, settings: StudySettings):
+        self.name: Final = name
+        self.storage: Final = storage
+        self.settings: Final = settings
+        self.study: Final = study
+        self.sampler: Final = settings.sampler()
+        study.sampler = self.sampler
+        self._ledger: Final = Ledger(storage.backend, name, settings.space)
+
+    @classmethod
+    def create(cls, name: str, settings: StudySettings, storage: str = "", *, resume: bool = False) -> "RobotStudy":
+        """Create a study, and open it.
+
+        Parameters
+        ----------
+        name
+            Letters, digits, '-', '_' and single dots.
+        settings
+            What it is; written into it.
+        storage
+            URL, see `surehold.studies.storage`; by default the journal runs/NAME/journal.log.
+        resume
+            Whether to open the study if it exists, and its settings agree.
+
+        Raises
+        ------
+        InputError
+            If the storage cannot be used, or the study exists and may not be resumed or has other settings.
+        """
+        opened = open_storage(storage, checked_name(name), create=True)
+        with opened.closed_on_error(), opened.failures(), opened.handing_out(name):
+            if name not in optuna.get_all_study_names(opened.backend):
+                study = optuna.create_study(storage=opened.backend, study_name=name, direction="maximize")
+                study.set_user_attr(SETTINGS, settings.to_json())
+            elif not resume:
+                raise InputError(f"study '{name}' exists in {opened.shown}; use it, or choose another name.")
+        found = cls._opened(name, opened)
+        with opened.closed_on_error():
+            differences = found.settings.differences(settings)
+            if differences:
+                raise InputError(
+                    f"study '{name}' exists in {opened.shown} with other settings: {'; '.join(differences)}. "
+                    "Drop those options to resume it, or choose another name."
+                )
+        return found
+
+    @classmethod
+    def open(cls, name: str, storage: str = "") -> "RobotStudy":
+        """Open a study that exists.
+
+        Raises
+        ------
+        InputError
+            If the storage is not there or cannot be used, or holds no study of that name.
+        """
+        return cls._opened(name, open_storage(storage, checked_name(name), create=False))
+
+    @classmethod
+    def _opened(cls, name: str, storage: Storage) -> "RobotStudy":
+        with storage.closed_on_error(), storage.failures():
+            names = optuna.get_all_study_names(storage.backend)
+            if name not in names:
+                there = f"there are {', '.join(names)}" if names else "there is none"
+                raise InputError(f"study '{name}' is not in {storage.shown}; {there}. Create it first.")
+            study = optuna.load_study(study_name=name, storage=storage.backend)
+            return cls(name, storage, study, StudySettings.of(study))
+
+    def close(self) -> None:
+        """Close connections to a database."""
+        self.storage.close()
+
+    # --- asking ---------------------------------------------------------------------------------------------------
+
+    def ask(self, worker: str | None = None, *, lifetime: float | None = None) -> Asked:
+        """Hand out a trial.
+
+        Parameters
+        ----------
+        worker
+            Who will make it. Where that one holds a trial that it has not told yet, it gets the same one again: to ask
+            a second time after a crash, or after an answer that never arrived, is harmless.
+        lifetime
+            Seconds for which the worker counts as alive, see `renew`; a trial whose worker is dead is handed out
+            again before any new one. None: forever.
+
+        Raises
+        ------
+        NothingToAsk
+            If the study is paused or has stopped. Trials of dead workers are handed out even after it has stopped.
+        """
+        now = time.time()
+        until = None if lifetime is None else now + lifetime
+        with self.storage.failures(), self.storage.handing_out(self.name):
+            trials = self._ledger.trials()
+            reason = self.paused
+            if reason is not None:
+                raise NothingToAsk(f"study '{self.name}' is paused ({reason}); resume it first.")
+            trial = self._ledger.held(trials, worker) or self._ledger.orphan(trials, now)
+            if trial is not None:
+                before = holder_of(trial)
+                attempts = 1 if before is None else before.attempts + 1
+                self._ledger.hold(trial, Holder(worker or "", until, attempts))
+                return self._asked(trial, True)
+            reason, promise = self._stop_reason(trials, now)
+            if reason:
+                raise NothingToAsk(f"study '{self.name}' has stopped: {reason}. Change its stop rule to go on.")
+            holder = Holder(worker or "", until, 1)
+            if any(t.state == TrialState.WAITING for t in trials):  # enqueued by Optuna's means
+                trial = self._ledger.trial(self.study.ask(self.settings.space.distributions).number)
+                self._ledger.hold(trial, holder)
+            else:
+                parameters = self.sampler.suggest(trials, len(trials), True)
+                marks = {HOLDER: holder} | ({} if promise is None else {PROMISE: promise})
+                trial = self._ledger.store(TrialState.RUNNING, parameters, marks)
+            return self._asked(trial, False)
+
+    def renew(self, id: int, worker: str, lifetime: float) -> None:
+        """Say that a worker is alive for `lifetime` more seconds; 0 lets its trial be taken up at once."""
+        with self.storage.failures():
+            self._ledger.renew(id, worker, lifetime)
+
+    def next(self) -> dict[str, Any]:
+        """Return the parameters that `ask` would hand out as a new trial now, and change nothing."""
+        with self.storage.failures():
+            trials = self._ledger.trials()
+            for trial in trials:
+                if trial.state == TrialState.WAITING and self.settings.space.contains(parameters_of(trial)):
+                    return parameters_of(trial)
+            return self.sampler.suggest(trials, len(trials), True)
+
+    def promise(self) -> float | None:
+        """Return the improvement that a further trial is expected to bring; None during the initial design."""
+        with self.storage.failures():
+            return self._promise(self._ledger.trials())
+
+    # --- telling --------------------------------------------------------------------------------------------------
+
+    def tell(
+        self, id: int, value: Any = None, *, failed: bool = False, reached: Mapping[str, Any] | None = None
+    ) -> Told:
+        """Take the answer to a trial: its value, or that it gave nothing.
+
+        Parameters
+        ----------
+        id
+            Of the trial, as `ask` gave it.
+        value
+            Finite; larger is better.
+        failed
+            Whether the trial gave nothing; then there is no value.
+        reached
+            The parameters that were truly reached, all of them or those that differ.
+
+        Raises
+        ------
+        InputError
+            If there is no such trial, the value is not finite, what was reached lies outside the ranges, or the trial
+            was told something else before. What was told before stays.
+        """
+        with self.storage.failures():
+            return self._ledger.tell(id, value, failed, reached)
+
+    def add(
+        self,
+        parameters: Mapping[str, Any],
+        value: Any = None,
+        *,
+        failed: bool = False,
+        reached: Mapping[str, Any] | None = None,
+        note: str = "added by hand",
+    ) -> int:
+        """Store a trial that was made without being asked for, and return its id; arguments as in `tell`."""
+        number = checked_value(value, failed)
+        commanded = self.settings.space.check(parameters)
+        marks: dict[str, Any] = {NOTE: note}
+        if reached is not None:
+            marks[REACHED] = self.settings.space.check(commanded | dict(reached), "reached")
+        state = TrialState.FAIL if failed else TrialState.COMPLETE
+        with self.storage.failures(), self.storage.handing_out(self.name):
+            return self._ledger.store(state, commanded, marks, number).number
+
+    def veto(self, id: int, reason: str = "") -> None:
+        """Forbid a trial that has been handed out or waits; the model avoids it as it does a failed one.
+
+        Raises
+        ------
+        InputError
+            If there is no such trial, or it is finished.
+        """
+        with self.storage.failures():
+            self._ledger.veto(id, reason or "no reason given")
+
+    # --- ruling ---------------------------------------------------------------------------------------------------
+
+    def pause(self, reason: str = "") -> None:
+        """Hand out nothing until `resume`; trials under way can be told."""
+        with self.storage.failures():
+            self.study.set_user_attr(_PAUSED, reason or "no reason given")
+
+    def resume(self) -> None:
+        """Hand out trials again."""
+        with self.storage.failures():
+            if self.paused is not None:
+                self.study.set_user_attr(_PAUSED, None)
+
+    @property
+    def paused(self) -> str | None:
+        """Why the study is paused; None where it is not."""
+        return self.study.user_attrs.get(_PAUSED)
+
+    @property
+    def stop_rule(self) -> StopRule:
+        """When asking ends."""
+        return StopRule.from_dict(self.study.user_attrs.get(_STOP))
+
+    def set_stop_rule(self, rule: StopRule) -> None:
+        """Store when asking ends; `StopRule()` never."""
+        with self.storage.failures():
+            if rule != self.stop_rule:
+                self.study.set_user_attr(_STOP, rule.as_dict())
+
+    def stopped(self) -> str:
+        """Return why asking has ended, empty where it goes on."""
+        with self.storage.failures():
+            return self._stop_reason(self._ledger.trials(), time.time())[0]
+
+    # --- looking --------------------------------------------------------------------------------------------------
+
+    def recommend(self) -> StudyRecommendation:
+        """Return the safe answer, and write it into the study; see `surehold.studies.recommend`."""
+        with self.storage.failures():
+            return recommend(self.study, self.sampler)
+
+    def trials(self) -> list[FrozenTrial]:
+        """Return all trials as Optuna stores them, by number; not to be changed."""
+        with self.storage.failures():
+            return self._ledger.trials()
+
+    @property
+    def n_initial(self) -> int:
+        """Trials of the initial design."""
+        return self.sampler.n_initial(self.settings.space)
+
+    # --- inside ---------------------------------------------------------------------------------------------------
+
+    def _stop_reason(self, trials: list[FrozenTrial], now: float) -> tuple[str, float | None]:
+        """Return why asking ends (empty where it goes on), and what the next trial promises where that is asked."""
+        rule = self.stop_rule
+        begun = sum(t.state != TrialState.WAITING for t in trials)
+        reason = rule.reason(begun, now, [])
+        if reason or rule.improvement is None:
+            return reason, None
+        promise = self._promise(trials)
+        if promise is None:
+            return "", None
+        promised = [t.user_attrs[PROMISE] for t in trials if PROMISE in t.user_attrs]
+        return rule.reason(begun, now, [*promised, promise]), promise
+
+    def _promise(self, trials: list[FrozenTrial]) -> float | None:
+        history = history_of(trials, self.settings.space, True)
+        if len(trials) < self.n_initial or not np.isfinite(history.y).any():
+            return None
+        with self.sampler.optimizing(self.settings.space, history) as optimizer:
+            return optimizer.promise()
+
+    def _asked(self, trial: FrozenTrial, again: bool) -> Asked:
+        parameters = {name: trial.params[name] for name in self.settings.space.distributions}
+        return Asked(trial.number, parameters, dict(self.settings.units), again)

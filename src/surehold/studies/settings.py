@@ -1,0 +1,136 @@
+"""What a study is: its parameters, their units and noise, the optimizer's settings, and the problem it is about.
+
+Written into the study when it is created; whoever opens the study later works with what is written there.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from optuna.study import Study
+
+from surehold.errors import InputError
+from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.risk import Risk
+from surehold.studies.sampler import Sampler
+from surehold.studies.search_space import SearchSpace
+
+__all__ = ["SETTINGS", "StudySettings"]
+
+#: Study attribute that holds the settings.
+SETTINGS: Final = "surehold:settings"
+_VERSION: Final = 1
+
+
+@dataclass(frozen=True)
+class StudySettings:
+    """What a study is."""
+
+    space: SearchSpace
+    input_noise: InputNoise | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+    """unit of each parameter by name, such as {"dx": "m"}; those without one are left out"""
+    optimizer: Mapping[str, Any] = field(default_factory=dict)
+    """further settings of `Sampler`: seed, surrogate, criterion, n_initial, risk, ...; plain data, or a `Risk`"""
+    problem: Mapping[str, Any] = field(default_factory=dict)
+    """what a worker tries, as plain data; empty where a robot makes the trials"""
+
+    def __post_init__(self) -> None:
+        for name in self.units:
+            if name not in self.space.distributions:
+                raise InputError(
+                    f"unit given for '{name}', which is no parameter; they are {', '.join(self.space.distributions)}."
+                )
+        self.sampler()
+
+    def sampler(self) -> Sampler:
+        """Return a sampler with these settings; raises InputError where they are wrong."""
+        return Sampler(self.space, input_noise=self.input_noise, **self.optimizer)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        optimizer = {key: asdict(v) if isinstance(v, Risk) else v for key, v in self.optimizer.items()}
+        return {
+            "version": _VERSION,
+            "parameters": self.space.to_json(),
+            "input_noise": _noise_to_json(self.input_noise, self.space),
+            "units": dict(self.units),
+            "optimizer": {"seed": 0, **optimizer},
+            "problem": dict(self.problem),
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "StudySettings":
+        """Return the settings that `to_json` described.
+
+        Raises
+        ------
+        InputError
+            If they were written by a newer version of surehold.
+        """
+        version = data.get("version", 0)
+        if not isinstance(version, int) or version > _VERSION:
+            raise InputError(f"the study was written by a newer version of surehold (format {version}); install that.")
+        space = SearchSpace.from_json(data["parameters"])
+        optimizer = {k: Risk(**v) if k == "risk" and isinstance(v, dict) else v for k, v in data["optimizer"].items()}
+        noise = _noise_from_json(data["input_noise"])
+        return cls(space, noise, data["units"], optimizer, data.get("problem", {}))
+
+    @classmethod
+    def of(cls, study: Study) -> "StudySettings":
+        """Return the settings written into a study; raises InputError where there are none."""
+        data = study.user_attrs.get(SETTINGS)
+        if not isinstance(data, dict):
+            raise InputError(
+                f"study '{study.study_name}' was not created by surehold; create one of another name, and take its "
+                "trials over with: surehold study import."
+            )
+        return cls.from_json(data)
+
+    def differences(self, other: "StudySettings") -> list[str]:
+        """Return in words what `other` wants differently, empty where they agree."""
+        mine, theirs = self.to_json(), other.to_json()
+        found = []
+        for part, name in (("parameters", "parameter"), ("units", "unit of"), ("optimizer", ""), ("problem", "")):
+            for key in mine[part] | theirs[part]:
+                ours, asked = (_short(side[part].get(key)) for side in (mine, theirs))
+                if ours != asked:
+                    found.append(f"{name} {key}: {ours} in the study, {asked} now".strip())
+        if mine["input_noise"] != theirs["input_noise"]:
+            found.append(
+                f"input noise: {_short(mine['input_noise'])} in the study, {_short(theirs['input_noise'])} now"
+            )
+        return found
+
+
+def _short(value: Any) -> str:
+    """Return a setting as a message shows it."""
+    if isinstance(value, dict) and "attributes" in value:
+        attributes = value["attributes"]
+        if "choices" in attributes:
+            return "|".join(map(str, attributes["choices"]))
+        kind = [k for k in ("log", "step") if attributes.get(k)]
+        return f"{attributes['low']:g}:{attributes['high']:g}{' ' if kind else ''}{' '.join(kind)}"
+    return "nothing" if value is None else str(value)
+
+
+def _noise_to_json(noise: InputNoise | None, space: SearchSpace) -> dict[str, Any] | None:
+    """Return standard deviations by name, or a covariance in the order of the numbers, in the parameters' units."""
+    numbers = space.numbers
+    if noise is None or numbers is None:
+        return None
+    covariance = noise.unit_covariance(numbers)
+    deviations = np.sqrt(np.diag(covariance)) * numbers.widths
+    if np.array_equal(covariance, np.diag(np.diag(covariance))):
+        rounded = [float(f"{deviation:.14g}") for deviation in deviations]  # 0.003, not 0.0029999999999999996
+        return {"standard_deviations": dict(zip(numbers.names, rounded, strict=True))}
+    return {"covariance": (covariance * np.outer(numbers.widths, numbers.widths)).tolist()}
+
+
+def _noise_from_json(data: Mapping[str, Any] | None) -> InputNoise | None:
+    if data is None:
+        return None
+    if "covariance" in data:
+        return InputNoise(covariance=data["covariance"])
+    return InputNoise(data["standard_deviations"])

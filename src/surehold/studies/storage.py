@@ -1,0 +1,286 @@
+"""Where a study is kept: a journal file, SQLite or PostgreSQL, by URL; and the lock under which trials are handed out.
+
+    ""                          the journal of a run, runs/NAME/journal.log
+    path/to/journal.log         a journal file: one line an operation, forced to the disk before the operation returns
+    journal:///path/to/file     the same
+    sqlite:///path/to/file.db   SQLite
+    postgresql://user@host/db   PostgreSQL
+    memory                      the process' own memory, gone with it
+
+Who hands out a trial holds the study's lock: no two workers get the same one, and each sees what the others were given.
+The locks are the operating system's (files) or the server's (PostgreSQL): they end with the process that holds them,
+however it ends.
+"""
+
+import os
+import re
+import threading
+import warnings
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final
+
+from optuna import logging
+from optuna.exceptions import DuplicatedStudyError, StorageInternalError
+from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, RDBStorage, get_storage
+from optuna.storages.journal import JournalFileBackend
+
+from surehold.errors import InputError
+
+__all__ = ["JOURNAL", "Storage", "checked_name", "open_storage"]
+
+JOURNAL: Final = "journal.log"
+_SCHEMES: Final = "a journal file (path or journal:///path), sqlite:///file.db, postgresql://user@host/database, memory"
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_SQLITE_PATIENCE: Final = 30.0  # seconds to wait for another process' write; ?timeout= in the URL overrides it
+
+_log = logging.get_logger(__name__)
+
+
+def checked_name(name: str) -> str:
+    """Return the name of a study; raises InputError where it could not be part of a path or an address."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name) or ".." in name:
+        raise InputError(
+            f"study name {name!r} is not usable; use letters, digits, '-', '_' and single dots, 100 at most, the first "
+            "a letter or digit."
+        )
+    return name
+
+
+class Storage:
+    """An opened storage: Optuna's `backend`, its `url` (`shown` without password), and the lock of each study in it."""
+
+    def __init__(self, backend: BaseStorage, url: str, lock_file: Path | None, engine: Any = None):
+        self.backend: Final = backend
+        self.url: Final = url
+        self.shown: Final = _without_password(url)
+        self._lock_file = lock_file
+        self._engine = engine
+        self._threads = threading.RLock()
+        self._depth = 0
+
+    @contextmanager
+    def handing_out(self, name: str) -> Iterator[None]:
+        """Hold the lock of the study of that name; only one thread of all processes does at a time."""
+        with self._threads:
+            if self._depth:
+                yield
+                return
+            self._depth = 1
+            try:
+                with self._across_processes(name):
+                    yield
+            finally:
+                self._depth = 0
+
+    @contextmanager
+    def failures(self) -> Iterator[None]:
+        """Turn what the storage raises inside the block into one kind of error, which says what to do."""
+        from sqlalchemy.exc import SQLAlchemyError
+
+        try:
+            yield
+        except (StorageInternalError, SQLAlchemyError) as error:
+            cause = error.__cause__ or error
+            reason = str(getattr(cause, "orig", None) or cause).strip().splitlines()[0]
+            raise InputError(f"storage {self.shown} cannot be used: {reason}. Nothing was changed.") from error
+        except OSError as error:
+            raise InputError(f"storage {self.shown} cannot be used: {error.strerror or error}.") from error
+        except DuplicatedStudyError:
+            raise InputError(f"the study exists in {self.shown} already; use it, or choose another name.") from None
+
+    @contextmanager
+    def closed_on_error(self) -> Iterator[None]:
+        """Close connections where the block raises."""
+        try:
+            yield
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close connections to a database."""
+        if self._engine is not None:
+            self._engine.dispose()
+
+    @contextmanager
+    def _across_processes(self, name: str) -> Iterator[None]:
+        if self._lock_file is not None:
+            with _locked(self._lock_file):
+                yield
+        elif self._engine is not None:
+            from sqlalchemy import text
+
+            key = {"key": zlib.crc32(f"surehold:{name}".encode())}
+            with self._engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+                connection.execute(text("SELECT pg_advisory_lock(:key)"), key)
+                try:
+                    yield
+                finally:
+                    connection.execute(text("SELECT pg_advisory_unlock(:key)"), key)
+        else:
+            yield
+
+
+def open_storage(url: str, name: str, *, create: bool) -> Storage:
+    """Open the storage at a URL (see above) for the study `name`.
+
+    Raises
+    ------
+    InputError
+        If the URL is none, the storage is not there (with `create` False), cannot be written or reached, was written by
+        a newer version, or is damaged.
+    """
+    checked_name(name)
+    scheme, separator, rest = url.partition("://")
+    scheme = scheme.split("+")[0].lower()
+    if url == "memory":
+        return Storage(InMemoryStorage(), url, None)
+    if scheme == "sqlite" and separator:
+        return _sqlite(url, create)
+    if scheme in ("postgresql", "postgres") and separator:
+        return _postgresql(f"postgresql+psycopg://{rest}", url)
+    if separator and scheme != "journal":
+        raise InputError(f"storage {url!r} is of no kind that is known; give {_SCHEMES}.")
+    path = Path(rest if separator else url) if url else Path("runs") / name / JOURNAL
+    return _journal(path, create)
+
+
+# --- files --------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Hold the operating system's lock of a file."""
+    import fcntl
+
+    with open(path, "ab") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield  # closing the file lets go of it
+
+
+class _JournalLock:
+    """The lock of a journal's writers, in the form that Optuna asks for.
+
+    Optuna's own locks are files that outlive a killed process; others then wait half a minute. A writer that was killed
+    or ran out of disk in the middle of a line leaves half a line behind, which was never acknowledged and would make
+    the next line unreadable: it is cut off, and said.
+    """
+
+    def __init__(self, journal: Path):
+        self._journal = journal
+        self._path = journal.with_suffix(journal.suffix + ".lock")
+        self._held = threading.local()
+
+    def acquire(self) -> bool:
+        import fcntl
+
+        file = open(self._path, "ab")  # noqa: SIM115
+        fcntl.flock(file, fcntl.LOCK_EX)
+        self._held.file = file
+        self._mend()
+        return True
+
+    def release(self) -> None:
+        self._held.file.close()
+
+    def _mend(self) -> None:
+        with open(self._journal, "rb+") as journal:
+            size = journal.seek(0, os.SEEK_END)
+            if size == 0:
+                return
+            journal.seek(-1, os.SEEK_END)
+            if journal.read(1) == b"\n":
+                return
+            journal.seek(0)
+            end = journal.read().rfind(b"\n") + 1
+            journal.truncate(end)
+        _log.warning(f"{self._journal}: an unfinished line of {size - end} bytes, never acknowledged, was cut off.")
+
+
+def _journal(path: Path, create: bool) -> Storage:
+    if path.is_dir():
+        path = path / JOURNAL
+    if not path.exists() and not create:
+        raise InputError(f"storage {str(path)!r} does not exist; give --storage, or create the study first.")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "ab+") as journal:
+            journal.seek(0)
+            start = journal.read(2)
+        if not b'{"'.startswith(start):  # before anything is mended in a file that is somebody else's
+            raise InputError(f"storage {str(path)!r} cannot be read: it is no journal, but some other file.")
+        lock = _JournalLock(path)
+        lock.acquire()
+        lock.release()
+    except OSError as error:
+        raise InputError(f"storage {str(path)!r} cannot be written: {error.strerror or error}.") from None
+    try:
+        backend = JournalStorage(JournalFileBackend(str(path), lock_obj=lock))  # type: ignore[arg-type]
+    except (ValueError, KeyError, AssertionError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"storage {str(path)!r} cannot be read: no journal, damaged, or of a newer version of Optuna ({error})."
+        ) from None
+    return Storage(backend, str(path), path.with_suffix(path.suffix + ".asking"))
+
+
+# --- databases ----------------------------------------------------------------------------------------------------
+
+
+def _sqlite(url: str, create: bool) -> Storage:
+    from sqlalchemy.engine import make_url
+
+    file = make_url(url).database
+    if not file or file == ":memory:":
+        raise InputError(f"storage {url!r} names no file; give sqlite:///path/to/file.db, or memory.")
+    path = Path(file)
+    if not path.exists() and not create:
+        raise InputError(f"storage {url!r} does not exist; give --storage, or create the study first.")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "ab"):
+            pass
+    except OSError as error:
+        raise InputError(f"storage {url!r} cannot be written: {error.strerror or error}.") from None
+    arguments: dict[str, Any] = {} if "timeout" in make_url(url).query else {"timeout": _SQLITE_PATIENCE}
+    storage, engine = _database(url, url, {"connect_args": arguments})
+    return Storage(storage, url, path.with_name(path.name + ".asking"), engine)
+
+
+def _postgresql(driver_url: str, url: str) -> Storage:
+    from importlib.util import find_spec
+
+    if find_spec("psycopg") is None:
+        raise InputError("storage on PostgreSQL needs psycopg; install it with: pip install 'surehold[study]'.")
+    storage, engine = _database(driver_url, url, {"pool_pre_ping": True, "connect_args": {"connect_timeout": 10}})
+    return Storage(storage, url, None, engine)
+
+
+def _database(driver_url: str, url: str, engine_kwargs: dict[str, Any]) -> tuple[BaseStorage, Any]:
+    from sqlalchemy.exc import ArgumentError, SQLAlchemyError
+
+    shown = _without_password(url)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            storage = RDBStorage(driver_url, engine_kwargs=engine_kwargs)
+    except ArgumentError as error:
+        raise InputError(f"storage {shown!r} is no valid URL: {error}.") from None
+    except SQLAlchemyError as error:
+        reason = str(getattr(error, "orig", None) or error).strip().splitlines()[0]
+        raise InputError(f"storage {shown!r} cannot be used: {reason}.") from None
+    except RuntimeError as error:
+        raise InputError(f"storage {shown!r} does not fit this version of Optuna: {error}") from None
+    return get_storage(storage), storage.engine
+
+
+def _without_password(url: str) -> str:
+    from sqlalchemy.engine import make_url
+
+    if "://" not in url:
+        return url or "memory"
+    with suppress(Exception):
+        return make_url(url).render_as_string(hide_password=True)
+    return url

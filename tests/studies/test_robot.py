@@ -1,0 +1,419 @@
+import json
+import math
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import optuna
+import pytest
+from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
+from optuna.trial import TrialState
+
+import surehold as sh
+from surehold.errors import InputError
+from surehold.studies.robot import NothingToAsk, RobotStudy
+from surehold.studies.search_space import SearchSpace
+from surehold.studies.settings import StudySettings
+from surehold.studies.stop_rule import StopRule
+
+BOX = sh.Box({"dx": (-0.05, 0.05), "dy": (-0.03, 0.03)})
+SETTINGS = StudySettings(
+    SearchSpace(BOX), sh.InputNoise({"dx": 0.003, "dy": 0.003}), {"dx": "m", "dy": "m"}, {"seed": 4, "n_initial": 6}
+)
+
+
+def quality(p):
+    return 1.0 - 40.0 * abs(p["dx"] - 0.01) - 20.0 * abs(p["dy"])
+
+
+@pytest.fixture
+def robot(url):
+    study = RobotStudy.create("mug", SETTINGS, url)
+    yield study
+    study.close()
+
+
+OPENED = []
+
+
+@pytest.fixture(autouse=True)
+def close_all():
+    yield
+    while OPENED:
+        OPENED.pop().close()
+
+
+def again(robot):
+    OPENED.append(RobotStudy.open(robot.name, robot.storage.url))
+    return OPENED[-1]
+
+
+def test_asked_told_and_recommended(robot):
+    for k in range(20):
+        asked = robot.ask()
+        assert asked.id == k
+        assert asked.units == {"dx": "m", "dy": "m"}
+        assert not asked.again
+        told = robot.tell(asked.id, quality(asked.parameters))
+        assert (told.state, told.already) == ("complete", False)
+    best = robot.recommend()
+    assert abs(best.parameters["dx"] - 0.01) < 0.005
+    assert best.parameters == robot.trials()[best.trial].params
+    other = again(robot)
+    assert other.study.user_attrs["surehold:recommendation"] == best.as_dict()
+    assert other.recommend() == best
+    optimizer = sh.Optimizer(BOX, input_noise=SETTINGS.input_noise, seed=4, n_initial=6)
+    for trial in robot.trials():
+        optimizer.tell([trial.params["dx"], trial.params["dy"]], trial.value)
+    assert best.mean == optimizer.recommend().mean
+
+
+def test_a_run_interrupted_at_any_trial_asks_the_same_next_point(tmp_path):
+    """At every trial of a 30-trial run, everything is opened anew from the disk."""
+    whole = RobotStudy.create("mug", SETTINGS, "memory")
+    asked = []
+    for _ in range(30):
+        trial = whole.ask()
+        asked.append(trial.parameters)
+        whole.tell(trial.id, quality(trial.parameters))
+    for url in (str(tmp_path / "journal.log"), f"sqlite:///{tmp_path}/study.db"):
+        RobotStudy.create("mug", SETTINGS, url).close()
+        for k in range(30):
+            resumed = RobotStudy.open("mug", url)
+            assert resumed.next() == asked[k]
+            trial = resumed.ask()
+            assert trial.parameters == asked[k]
+            resumed.close()
+            told = RobotStudy.open("mug", url)
+            told.tell(trial.id, quality(trial.parameters))
+            told.close()
+
+
+def test_an_interruption_between_ask_and_tell_loses_nothing(robot):
+    asked = robot.ask(worker="arm")
+    other = again(robot)
+    assert other.ask(worker="arm") == type(asked)(asked.id, asked.parameters, asked.units, True)
+    assert other.ask(worker="leg").id == 1
+    assert other.ask().id == 2
+    other.tell(asked.id, 0.5)
+    assert robot.ask(worker="arm").id == 3
+
+
+def test_telling_twice(robot):
+    asked = robot.ask()
+    robot.tell(asked.id, 0.25)
+    other = again(robot)
+    assert other.tell(asked.id, 0.25).already
+    with pytest.raises(InputError, match=r"told before: value 0\.25; now: value 0\.5"):
+        other.tell(asked.id, 0.5)
+    with pytest.raises(InputError, match="now: failed"):
+        other.tell(asked.id, failed=True)
+    failing = robot.ask()
+    assert robot.tell(failing.id, failed=True).state == "failed"
+    assert other.tell(failing.id, failed=True).already
+    with pytest.raises(InputError, match="told before: failed"):
+        other.tell(failing.id, 1.0)
+    assert [t.value for t in robot.trials()] == [0.25, None]
+
+
+def test_what_was_reached_is_what_the_model_learns_from(robot):
+    asked = robot.ask()
+    robot.tell(asked.id, 0.5, reached={"dx": 0.02})
+    assert robot.tell(asked.id, 0.5, reached={"dx": 0.02}).already
+    with pytest.raises(InputError, match="reached elsewhere"):
+        robot.tell(asked.id, 0.5, reached={"dx": 0.03})
+    best = robot.recommend()
+    assert best.parameters == {"dx": 0.02, "dy": asked.parameters["dy"]}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"value": math.nan}, "finite"),
+        ({"value": math.inf}, "finite"),
+        ({"value": "good"}, "finite"),
+        ({"value": True}, "finite"),
+        ({"value": [1.0, 2.0]}, "finite"),
+        ({}, "has no value"),
+        ({"value": 1.0, "failed": True}, "has no value, but"),
+        ({"value": 1.0, "reached": {"dx": 0.06}}, "outside its range"),
+        ({"value": 1.0, "reached": {"dx": math.nan}}, "finite"),
+        ({"value": 1.0, "reached": {"dz": 0.0}}, "'dz' is unknown"),
+        ({"value": 1.0, "id": 1}, "trial 1 is not in study 'mug'; the last one is 0"),
+        ({"value": 1.0, "id": -1}, "0 or more"),
+        ({"value": 1.0, "id": "0"}, "whole number"),
+        ({"value": 1.0, "id": 2**70}, "not in study"),
+    ],
+)
+def test_bad_answers_change_nothing(arguments, message, tmp_path):
+    robot = RobotStudy.create("mug", SETTINGS, str(tmp_path / "j.log"))
+    asked = robot.ask()
+    with pytest.raises(InputError, match=message):
+        robot.tell(**{"id": asked.id} | arguments)
+    assert [t.state for t in robot.trials()] == [TrialState.RUNNING]
+    assert robot.trials()[0].user_attrs.keys() == {"surehold:holder"}
+
+
+# --- people -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_vetoed_trial_is_avoided(robot):
+    asked = robot.ask()
+    robot.veto(asked.id, "would hit the table")
+    robot.veto(asked.id)
+    with pytest.raises(InputError, match="vetoed"):
+        robot.tell(asked.id, 1.0)
+    assert np.isnan(robot.sampler.optimizer(robot.study).y).tolist() == [True]
+    other = robot.ask()
+    robot.tell(other.id, 1.0)
+    with pytest.raises(InputError, match="only a pending one"):
+        robot.veto(other.id)
+    with pytest.raises(InputError, match="not in study"):
+        robot.veto(7)
+
+
+def test_a_trial_made_by_hand(robot):
+    assert robot.add({"dx": "0.01", "dy": 0}, 0.9, note="teach-in") == 0
+    assert robot.add({"dx": 0.02, "dy": 0.0}, failed=True) == 1
+    assert robot.add({"dx": 0.02, "dy": 0.0}, 0.3, reached={"dy": 0.001}) == 2
+    assert robot.ask().id == 3
+    optimizer = robot.sampler.optimizer(robot.study)
+    assert optimizer.X[0] == pytest.approx([0.01, 0.0])
+    for bad in ({"dx": 0.01}, {"dx": 0.06, "dy": 0.0}, {"dx": 0.0, "dy": 0.0, "dz": 0.0}):
+        with pytest.raises(InputError):
+            robot.add(bad, 1.0)
+    with pytest.raises(InputError, match="finite"):
+        robot.add({"dx": 0.01, "dy": 0.0}, math.nan)
+    assert len(robot.trials()) == 4
+
+
+def test_pausing(robot):
+    asked = robot.ask()
+    robot.pause("lunch")
+    other = again(robot)
+    with pytest.raises(NothingToAsk, match=r"paused \(lunch\)"):
+        other.ask()
+    other.tell(asked.id, 0.5)
+    robot.resume()
+    assert other.ask().id == 1
+
+
+def test_the_budget_ends_asking(robot):
+    robot.set_stop_rule(StopRule(trials=2))
+    first = robot.ask()
+    robot.ask()
+    with pytest.raises(NothingToAsk, match="budget of 2 trials"):
+        robot.ask()
+    assert "budget" in robot.stopped()
+    robot.tell(first.id, 1.0)
+    robot.set_stop_rule(StopRule())
+    assert robot.stopped() == ""
+    assert robot.ask().id == 2
+
+
+def test_time_ends_asking(robot):
+    robot.set_stop_rule(StopRule(until=time.time() + 3600.0))
+    robot.ask()
+    robot.set_stop_rule(StopRule(until=time.time() - 1.0))
+    with pytest.raises(NothingToAsk, match="time ended"):
+        robot.ask()
+
+
+def test_nothing_left_to_gain_ends_asking(tmp_path):
+    space = SearchSpace({"x": (0.0, 1.0)})
+    robot = RobotStudy.create("flat", StudySettings(space, optimizer={"n_initial": 5}), str(tmp_path / "j.log"))
+    robot.set_stop_rule(StopRule(improvement=1e-3, asks=3, trials=60))
+    while not robot.stopped():
+        asked = robot.ask()
+        robot.tell(asked.id, 1.0 - (asked.parameters["x"] - 0.4) ** 2)
+    with pytest.raises(NothingToAsk, match=r"promised an improvement of 0\.001"):
+        robot.ask()
+    assert len(robot.trials()) < 60
+    promises = [t.user_attrs["surehold:promise"] for t in robot.trials()[5:]]
+    assert max(promises[-2:]) < 1e-3
+    assert promises[0] > 1e-3
+    assert robot.promise() < 1e-3
+
+
+@pytest.mark.parametrize("bad", [{"trials": 0}, {"improvement": math.nan}, {"asks": 0}, {"until": -1}, {"trials": 2.5}])
+def test_stop_rules_that_make_no_sense(bad):
+    with pytest.raises(InputError):
+        StopRule(**bad)
+
+
+# --- many at once -----------------------------------------------------------------------------------------------------
+
+
+def test_threads_get_different_trials(robot):
+    found = []
+
+    def work():
+        for _ in range(5):
+            asked = robot.ask()
+            found.append(asked)
+            robot.tell(asked.id, quality(asked.parameters))
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(a.id for a in found) == list(range(20))
+    assert len({tuple(a.parameters.values()) for a in found}) == 20
+    assert all(t.state == TrialState.COMPLETE for t in robot.trials())
+
+
+PROCESS = """
+import json, sys
+from surehold.studies.robot import RobotStudy
+robot = RobotStudy.open("mug", sys.argv[1])
+ids = []
+for _ in range(6):
+    asked = robot.ask()
+    ids.append(asked.id)
+    robot.tell(asked.id, -asked.parameters["dx"] ** 2)
+print(json.dumps(ids))
+"""
+
+
+def test_processes_get_different_trials(tmp_path):
+    robot = RobotStudy.create("mug", SETTINGS, str(tmp_path / "journal.log"))
+    runs = [
+        subprocess.Popen([sys.executable, "-c", PROCESS, robot.storage.url], stdout=subprocess.PIPE) for _ in range(3)
+    ]
+    ids = [i for run in runs for i in json.loads(run.communicate(timeout=120)[0])]
+    assert sorted(ids) == list(range(18))
+    trials = again(robot).trials()
+    assert len({tuple(t.params.values()) for t in trials}) == 18
+    assert all(t.state == TrialState.COMPLETE for t in trials)
+
+
+def test_a_dead_workers_trial_is_taken_up_again_and_its_late_answer_counts(robot):
+    first = robot.ask("one", lifetime=0.05)
+    time.sleep(0.1)
+    second = robot.ask("two", lifetime=60.0)
+    assert second.id == first.id
+    assert second.parameters == first.parameters
+    assert second.again
+    robot.renew(first.id, "one", 60.0)  # no longer its own: nothing happens
+    assert robot.tell(first.id, 0.7).already is False  # the first answer, of the worker believed dead
+    assert robot.tell(second.id, 0.7).already
+    with pytest.raises(InputError, match="first answer"):
+        robot.tell(second.id, 0.71)
+
+
+def test_a_worker_that_says_that_it_lives_keeps_its_trial(robot):
+    asked = robot.ask("one", lifetime=0.05)
+    robot.renew(asked.id, "one", 60.0)
+    time.sleep(0.1)
+    assert robot.ask("two").id != asked.id
+    robot.renew(asked.id, "one", 0.0)
+    time.sleep(0.01)
+    assert robot.ask("three").id == asked.id
+
+
+def test_a_trial_that_kills_every_worker_fails(robot):
+    for _ in range(5):
+        assert robot.ask(lifetime=0.0).id == 0
+        time.sleep(0.002)
+    assert robot.ask().id == 1
+    assert robot.trials()[0].state == TrialState.FAIL
+    assert "workers died of it" in robot.trials()[0].user_attrs["surehold:note"]
+
+
+def test_enqueued_trials_come_first(robot):
+    robot.study.enqueue_trial({"dx": 0.01, "dy": 0.02})
+    robot.study.enqueue_trial({"dx": -0.01})
+    assert robot.next() == {"dx": 0.01, "dy": 0.02}
+    assert robot.ask().parameters == {"dx": 0.01, "dy": 0.02}
+    assert robot.ask().parameters["dx"] == -0.01
+
+
+# --- opening ----------------------------------------------------------------------------------------------------------
+
+
+def test_other_settings_are_refused_by_name(robot):
+    resumed = RobotStudy.create("mug", SETTINGS, robot.storage.url, resume=True)
+    OPENED.append(resumed)
+    assert resumed.name == "mug"
+    with pytest.raises(InputError, match="exists in"):
+        RobotStudy.create("mug", SETTINGS, robot.storage.url)
+    wider = SearchSpace({"dx": (-0.05, 0.06), "dy": (-0.03, 0.03)})
+    cases = {
+        "parameter dx: -0.05:0.05 in the study, -0.05:0.06 now": StudySettings(
+            wider, SETTINGS.input_noise, SETTINGS.units, SETTINGS.optimizer
+        ),
+        "input noise: .*0.003.* in the study, nothing now": StudySettings(
+            SETTINGS.space, None, SETTINGS.units, SETTINGS.optimizer
+        ),
+        "seed: 4 in the study, 5 now": StudySettings(
+            SETTINGS.space, SETTINGS.input_noise, SETTINGS.units, {"seed": 5, "n_initial": 6}
+        ),
+        "unit of dy: m in the study, nothing now": StudySettings(
+            SETTINGS.space, SETTINGS.input_noise, {"dx": "m"}, SETTINGS.optimizer
+        ),
+    }
+    for message, settings in cases.items():
+        with pytest.raises(InputError, match=message):
+            RobotStudy.create("mug", settings, robot.storage.url, resume=True)
+    assert robot.ask().id == 0
+
+
+def test_settings_survive_the_storage(tmp_path):
+    space = SearchSpace(
+        {
+            "x": FloatDistribution(0.1, 10.0, log=True),
+            "n": IntDistribution(1, 9, step=2),
+            "c": CategoricalDistribution(["a", "b"]),
+        }
+    )
+    settings = StudySettings(
+        space,
+        sh.InputNoise({"x": 0.1, "n": 0.0}),
+        {"x": "N"},
+        {"seed": 1, "risk": sh.Risk("cvar", alpha=0.2), "surrogate": "tgp"},
+    )
+    robot = RobotStudy.create("all", settings, f"sqlite:///{tmp_path}/a.db")
+    stored = RobotStudy.open("all", robot.storage.url).settings
+    assert stored.differences(settings) == []
+    assert stored.optimizer["risk"] == sh.Risk("cvar", alpha=0.2)
+    assert robot.ask().parameters == RobotStudy.open("all", robot.storage.url).trials()[0].params
+
+
+def test_a_correlated_noise_survives_the_storage(tmp_path):
+    covariance = np.array([[9e-6, 2e-6], [2e-6, 4e-6]])
+    settings = StudySettings(SearchSpace(BOX), sh.InputNoise(covariance=covariance))
+    robot = RobotStudy.create("c", settings, str(tmp_path / "j.log"))
+    found = RobotStudy.open("c", robot.storage.url).settings.input_noise.unit_covariance(BOX)
+    assert np.allclose(found, covariance / np.outer(BOX.widths, BOX.widths), rtol=1e-12)
+
+
+def test_a_study_of_a_newer_version_is_refused(robot):
+    robot.study.set_user_attr("surehold:settings", SETTINGS.to_json() | {"version": 99})
+    with pytest.raises(InputError, match="newer version of surehold"):
+        again(robot)
+
+
+def test_a_study_that_is_not_ours_is_refused(url):
+    from surehold.studies.storage import open_storage
+
+    storage = open_storage(url, "theirs", create=True)
+    OPENED.append(storage)
+    optuna.create_study(study_name="theirs", storage=storage.backend)
+    with pytest.raises(InputError, match="not created by surehold"):
+        RobotStudy.open("theirs", url)
+    with pytest.raises(InputError, match="there are theirs"):
+        RobotStudy.open("mug", url)
+
+
+def test_names_and_settings_that_cannot_be(tmp_path):
+    for name in ("", "../x", "a/b", "a..b", ".hidden", "a b", "x" * 101, "ä", "a\n"):
+        with pytest.raises(InputError, match="study name"):
+            RobotStudy.create(name, SETTINGS, str(tmp_path / "j.log"))
+    with pytest.raises(InputError, match="no parameter"):
+        StudySettings(SearchSpace(BOX), units={"dz": "m"})
+    with pytest.raises(InputError, match="criterion"):
+        StudySettings(SearchSpace(BOX), optimizer={"criterion": "best"})
+    assert not (tmp_path / "j.log").exists()

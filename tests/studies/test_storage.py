@@ -1,0 +1,176 @@
+import os
+import sqlite3
+import subprocess
+import sys
+import time
+
+import optuna
+import pytest
+
+from surehold.errors import InputError
+from surehold.studies.dashboard_note import read_note, write_note
+from surehold.studies.robot import RobotStudy
+from surehold.studies.search_space import SearchSpace
+from surehold.studies.settings import StudySettings
+from surehold.studies.storage import open_storage
+
+SETTINGS = StudySettings(SearchSpace({"x": (0.0, 1.0)}), optimizer={"n_initial": 4})
+
+
+def test_the_default_is_a_journal_of_the_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    RobotStudy.create("mug", SETTINGS).ask()
+    assert (tmp_path / "runs" / "mug" / "journal.log").stat().st_size > 0
+    assert RobotStudy.open("mug").ask().id == 1
+    assert RobotStudy.open("mug", "runs/mug").ask().id == 2
+    assert RobotStudy.open("mug", f"journal://{tmp_path}/runs/mug/journal.log").ask().id == 3
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("gone/journal.log", "does not exist"),
+        ("sqlite:///gone.db", "does not exist"),
+        ("sqlite://", "names no file"),
+        ("mysql://host/db", "of no kind that is known"),
+        ("postgresql://nobody@127.0.0.1:1/none", "cannot be used"),
+        ("redis://localhost", "of no kind that is known"),
+    ],
+)
+def test_storages_that_are_not_there(url, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=message):
+        RobotStudy.open("mug", url)
+    assert os.listdir(tmp_path) == []
+
+
+def test_passwords_are_not_shown():
+    with pytest.raises(InputError) as error:
+        RobotStudy.open("mug", "postgresql://me:secret@127.0.0.1:1/none")
+    assert "secret" not in str(error.value)
+    assert "me:***@" in str(error.value)
+
+
+@pytest.mark.parametrize("url", ["{}/file/journal.log", "sqlite:///{}/file/a.db", "{}/folder.db"])
+def test_storages_that_cannot_be_written(url, tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    (tmp_path / "folder.db").mkdir()
+    (tmp_path / "folder.db" / "journal.log").mkdir()
+    with pytest.raises(InputError, match="cannot be"):
+        RobotStudy.create("mug", SETTINGS, url.format(tmp_path))
+
+
+@pytest.mark.skipif(os.getuid() == 0, reason="root may write everywhere")
+def test_storages_without_permission(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(InputError, match="cannot be written"):
+        RobotStudy.create("mug", SETTINGS, str(tmp_path / "journal.log"))
+
+
+@pytest.mark.parametrize(
+    "text", ["hello\n", '{"op_code": 99}\n', '{"op_code": 0}\n', "[1]\n", "\0\0\n", '{"op_code": 0']
+)
+def test_journals_that_are_none(text, tmp_path):
+    path = tmp_path / "journal.log"
+    path.write_text(text)
+    with pytest.raises(InputError, match="cannot be read|is not in"):
+        RobotStudy.open("mug", str(path))
+
+
+def test_databases_that_are_none_or_of_a_newer_version(tmp_path):
+    (tmp_path / "a.db").write_text("this is no database, but a text that is long enough to be mistaken for one" * 9)
+    with pytest.raises(InputError, match="cannot be used"):
+        RobotStudy.open("mug", f"sqlite:///{tmp_path}/a.db")
+    url = f"sqlite:///{tmp_path}/b.db"
+    RobotStudy.create("mug", SETTINGS, url).close()
+    with sqlite3.connect(tmp_path / "b.db") as connection:
+        connection.execute("UPDATE version_info SET schema_version = 99")
+        connection.execute("UPDATE alembic_version SET version_num = 'v99.0.0'")
+    connection.close()
+    with pytest.raises(InputError, match="version"):
+        RobotStudy.open("mug", url)
+
+
+def test_a_locked_database_is_said_and_nothing_is_lost(tmp_path):
+    url = f"sqlite:///{tmp_path}/a.db?timeout=0.1"
+    robot = RobotStudy.create("mug", SETTINGS, url)
+    asked = robot.ask()
+    other = sqlite3.connect(tmp_path / "a.db", isolation_level=None)
+    other.execute("BEGIN EXCLUSIVE")
+    for attempt in (lambda: robot.tell(asked.id, 0.5), robot.ask, lambda: RobotStudy.open("mug", url)):
+        with pytest.raises(InputError, match="locked"):
+            attempt()
+    other.execute("ROLLBACK")
+    other.close()
+    assert robot.tell(asked.id, 0.5).already is False
+    assert robot.ask().id == 1
+    robot.close()
+
+
+def test_half_a_line_of_a_journal_is_cut_off(tmp_path):
+    path = tmp_path / "journal.log"
+    robot = RobotStudy.create("mug", SETTINGS, str(path))
+    robot.tell(robot.ask().id, 0.5)
+    whole = path.read_bytes()
+    with open(path, "ab") as journal:
+        journal.write(b'{"op_code":4,"worker')
+    assert robot.ask().id == 1  # one that was open at that time
+    assert path.read_bytes().startswith(whole)
+    with open(path, "ab") as journal:
+        journal.write(b'{"op_code"')
+    assert [t.value for t in RobotStudy.open("mug", str(path)).trials()] == [0.5, None]
+    optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(path)))
+
+
+HOLDING = """
+import sys, time
+from surehold.studies.storage import open_storage
+with open_storage(sys.argv[1], "mug", create=True).handing_out("mug"):
+    print("held", flush=True)
+    time.sleep(600)
+"""
+
+
+def test_the_lock_ends_with_its_process(url):
+    storage = open_storage(url, "mug", create=True)
+    holder = subprocess.Popen([sys.executable, "-c", HOLDING, url], stdout=subprocess.PIPE, text=True)
+    assert holder.stdout.readline().strip() == "held"
+    began = time.monotonic()
+    waiter = subprocess.Popen(
+        [sys.executable, "-c", HOLDING.replace("time.sleep(600)", ""), url], stdout=subprocess.PIPE, text=True
+    )
+    time.sleep(1.0)
+    assert waiter.poll() is None, "a second process got the lock"
+    holder.kill()
+    holder.communicate()
+    assert waiter.communicate(timeout=60)[0].strip() == "held"
+    assert time.monotonic() - began < 60.0
+    with storage.handing_out("mug"), storage.handing_out("mug"):
+        pass
+    storage.close()
+
+
+def test_notes_are_those_of_the_dashboard(url):
+    from surehold.studies.storage import open_storage
+
+    storage = open_storage(url, "mug", create=True)
+    study = optuna.create_study(study_name="mug", storage=storage.backend)
+    backend, number = storage.backend, study._study_id
+    assert read_note(backend, number) == ""
+    for text in ("short", "long " * 2000, "ä" * 2045, "shorter", ""):
+        write_note(backend, number, text)
+        assert read_note(backend, number) == text
+        assert as_the_dashboard_reads(backend, number) == text
+    storage.close()
+
+
+def as_the_dashboard_reads(backend, number):
+    """Return the note by the dashboard's own function, loaded by itself: the package would load PyTorch."""
+    from importlib.util import find_spec, module_from_spec, spec_from_file_location
+    from pathlib import Path
+
+    folder = Path(find_spec("optuna_dashboard").submodule_search_locations[0])
+    spec = spec_from_file_location("_dashboard_note", folder / "_note.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.get_note_from_system_attrs(backend.get_study_system_attrs(number), None)["body"]
