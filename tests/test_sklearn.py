@@ -8,17 +8,24 @@ from sklearn.ensemble import RandomForestRegressor
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor as Reference
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.model_selection import GridSearchCV, KFold, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from surehold.sklearn import GaussianProcessRegressor
+from surehold.sklearn import GaussianProcessRegressor, TreedGaussianProcessRegressor
 
 pytestmark = pytest.mark.filterwarnings("ignore::sklearn.exceptions.SkipTestWarning")
 
 
-@parametrize_with_checks([GaussianProcessRegressor(), GaussianProcessRegressor(method="map", noise="none")])
+@parametrize_with_checks(
+    [
+        GaussianProcessRegressor(),
+        GaussianProcessRegressor(method="map", noise="none"),
+        TreedGaussianProcessRegressor(min_leaf=15),
+        TreedGaussianProcessRegressor(method="map"),
+    ]
+)
 def test_scikit_learn_accepts_it(estimator, check):
     check(estimator)
 
@@ -56,6 +63,25 @@ def test_grid_search_and_clone():
     assert std[1] > 10.0 * std[0]
     assert 20.0 < np.median(best.length_scales_) < 300.0
     assert best.noise_std([[0.0]]) < 1.0
+
+
+def test_the_tree_learns_many_observations_of_a_function_with_a_jump():
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-3.0, 7.0, (1200, 2))
+    y = np.where(X[:, 0] < 4.0, 0.1 * X[:, 1], 5.0 + np.sin(3.0 * X[:, 0])) + 0.05 * rng.standard_normal(1200)
+    model = make_pipeline(StandardScaler(), TreedGaussianProcessRegressor(40, method="map", random_state=0))
+    folds = KFold(3, shuffle=True, random_state=0)
+    treed = cross_val_score(model, X, y, cv=folds, scoring="neg_root_mean_squared_error")
+    assert -treed.mean() < 0.25, "against a standard deviation of 2.3"
+    fitted = TreedGaussianProcessRegressor(40, method="map", random_state=0).fit(X, y)
+    assert fitted.process_.posterior.diagnostics.partition.leaves > 5
+    assert np.median(fitted.noise_std(X)) == pytest.approx(0.05, rel=0.2)
+
+
+@pytest.mark.parametrize("settings", [{"min_leaf": 1}, {"weight_power": -1.0}, {"trees": 0}])
+def test_bad_settings_of_the_tree_are_refused_when_fitting(settings):
+    with pytest.raises(ValueError, match=next(iter(settings))):
+        TreedGaussianProcessRegressor(**settings).fit([[0.0], [1.0]], [0.0, 1.0])
 
 
 @pytest.mark.parametrize("settings", [{"kernel": "matern"}, {"noise": -1.0}, {"method": "mcmc"}, {"particles": 0}])
