@@ -13,7 +13,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.recommendation import Recommendation
 
-__all__ = ["Result", "Trial", "maximize"]
+__all__ = ["Result", "Trial", "evaluate", "maximize"]
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def _try_once(optimizer: Optimizer, f: Callable[[NDArray[np.float64]], float], t
     started = perf_counter()
     x = optimizer.ask()
     seconds = perf_counter() - started
-    y, failure = _evaluate(f, x)
+    y, failure = evaluate(f, x)
     if failure:
         optimizer.tell(x, failed=True)
     else:
@@ -149,7 +149,8 @@ def _try_once(optimizer: Optimizer, f: Callable[[NDArray[np.float64]], float], t
     return Trial(len(trials), x, y, failure, best, recommendation, seconds)
 
 
-def _evaluate(f: Callable[[NDArray[np.float64]], float], x: NDArray[np.float64]) -> tuple[float, str]:
+def evaluate(f: Callable[[NDArray[np.float64]], float], x: NDArray[np.float64]) -> tuple[float, str]:
+    """Return f(x) and an empty text, or NaN and why there is no finite number."""
     try:
         value = np.asarray(f(x.copy()), dtype=np.float64)
     except Exception as error:  # whatever a user's function raises is the trial's outcome, not the run's end

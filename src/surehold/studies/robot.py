@@ -30,7 +30,11 @@ _STOP: Final = "surehold:stop"  # study attribute: a `StopRule`
 
 
 class NothingToAsk(SureholdError):
-    """No trial is handed out: the study is paused, or its stop rule says that it has had enough."""
+    """No trial is handed out: the study is `paused`, or its stop rule says that it has had enough."""
+
+    def __init__(self, message: str, *, paused: bool):
+        super().__init__(message)
+        self.paused: Final = paused
 
 
 @dataclass(frozen=True)
@@ -154,7 +158,7 @@ class RobotStudy:
             trials = self._ledger.trials()
             reason = self.paused
             if reason is not None:
-                raise NothingToAsk(f"study '{self.name}' is paused ({reason}); resume it first.")
+                raise NothingToAsk(f"study '{self.name}' is paused ({reason}); resume it first.", paused=True)
             trial = self._ledger.held(trials, worker) or self._ledger.orphan(trials, now)
             if trial is not None:
                 before = holder_of(trial)
@@ -163,7 +167,8 @@ class RobotStudy:
                 return self._asked(trial, True)
             reason, promise = self._stop_reason(trials, now)
             if reason:
-                raise NothingToAsk(f"study '{self.name}' has stopped: {reason}. Change its stop rule to go on.")
+                message = f"study '{self.name}' has stopped: {reason}. Change its stop rule to go on."
+                raise NothingToAsk(message, paused=False)
             holder = Holder(worker or "", until, 1)
             if any(t.state == TrialState.WAITING for t in trials):  # enqueued by Optuna's means
                 trial = self._ledger.trial(self.study.ask(self.settings.space.distributions).number)

@@ -29,7 +29,7 @@ from optuna.storages.journal import JournalFileBackend
 
 from surehold.errors import InputError
 
-__all__ = ["JOURNAL", "Storage", "checked_name", "open_storage"]
+__all__ = ["JOURNAL", "Storage", "StorageFailure", "checked_name", "open_storage"]
 
 JOURNAL: Final = "journal.log"
 _SCHEMES: Final = "a journal file (path or journal:///path), sqlite:///file.db, postgresql://user@host/database, memory"
@@ -47,6 +47,10 @@ def checked_name(name: str) -> str:
             "a letter or digit."
         )
     return name
+
+
+class StorageFailure(InputError):
+    """The storage could not be read or written now; nothing was changed, and a later attempt may succeed."""
 
 
 class Storage:
@@ -85,9 +89,9 @@ class Storage:
         except (StorageInternalError, SQLAlchemyError) as error:
             cause = error.__cause__ or error
             reason = str(getattr(cause, "orig", None) or cause).strip().splitlines()[0]
-            raise InputError(f"storage {self.shown} cannot be used: {reason}. Nothing was changed.") from error
+            raise StorageFailure(f"storage {self.shown} cannot be used: {reason}. Nothing was changed.") from error
         except OSError as error:
-            raise InputError(f"storage {self.shown} cannot be used: {error.strerror or error}.") from error
+            raise StorageFailure(f"storage {self.shown} cannot be used: {error.strerror or error}.") from error
         except DuplicatedStudyError:
             raise InputError(f"the study exists in {self.shown} already; use it, or choose another name.") from None
 

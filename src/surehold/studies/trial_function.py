@@ -1,0 +1,71 @@
+"""What the workers of a study try: the problem that is written into the study, or a function of the user's own."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from surehold.errors import InputError
+from surehold.optimization.maximization import evaluate
+from surehold.studies.search_space import SearchSpace
+from surehold.studies.settings import StudySettings
+
+__all__ = ["Outcome", "problem_of", "trial_function"]
+
+
+class Outcome(NamedTuple):
+    """What came of a trial."""
+
+    value: float
+    """NaN where it failed"""
+    failure: str
+    """why it failed, empty where it did not"""
+
+
+def trial_function(f: Callable[[Any], Any], space: SearchSpace) -> Callable[[Mapping[str, Any]], Outcome]:
+    """Return what makes one trial from its parameters; it never raises.
+
+    f takes the numbers x (d,) in the order of the parameters; where a parameter is a choice among names, it takes the
+    parameters {name: value} instead.
+    """
+    choices = any(isinstance(v, str) or v is None for v in _examples(space))
+
+    def attempt(parameters: Mapping[str, Any]) -> Outcome:
+        if choices:
+            value, failure = evaluate(lambda _: f(dict(parameters)), np.empty(0))
+        else:
+            value, failure = evaluate(f, np.array([parameters[n] for n in space.distributions], dtype=np.float64))
+        return Outcome(value, failure)
+
+    return attempt
+
+
+def problem_of(settings: StudySettings, function: str = "") -> Callable[[Any], Any]:
+    """Return the problem that is written into a study, or the function named instead.
+
+    Raises
+    ------
+    InputError
+        If there is neither, or it cannot be loaded.
+    """
+    from surehold.problems import Grasp, load_function, synthetic_function
+
+    if function:
+        return load_function(function)
+    described = dict(settings.problem)
+    if "function" in described:
+        return load_function(described["function"])
+    if "synthetic" in described:
+        return synthetic_function(described["synthetic"])
+    if "grasp" in described:
+        arguments = dict(described["grasp"])
+        return Grasp(arguments.pop("object"), arguments.pop("facet"), arguments.pop("variables"), **arguments)
+    raise InputError(
+        "the study says nothing about what its trials are; a robot makes them (surehold study ask, tell), or give "
+        "--function package.module:function."
+    )
+
+
+def _examples(space: SearchSpace) -> list[Any]:
+    """Return some value of every choice among names."""
+    return [choice for d in space.distributions.values() for choice in getattr(d, "choices", ())]

@@ -1,0 +1,163 @@
+"""A worker: takes trials of a study, makes them, tells what came of them, until the study has had enough.
+
+Any number of workers share a study, in as many processes and on as many machines as reach its storage (whose clocks
+should agree within the lifetime). A worker says again and again that it is alive; when it has been silent for its
+lifetime, the trial that it was making is taken up by another one. A worker's answer is never thrown away because the
+storage is busy or away for some minutes.
+"""
+
+import os
+import socket
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Final
+
+from optuna import logging
+from optuna.trial import TrialState
+
+from surehold.errors import InputError
+from surehold.studies.ledger import holder_of
+from surehold.studies.robot import Asked, NothingToAsk, RobotStudy
+from surehold.studies.storage import StorageFailure
+from surehold.studies.trial_function import Outcome
+
+__all__ = ["LIFETIME", "work", "worker_name"]
+
+LIFETIME: Final = 120.0  # seconds of silence after which a worker counts as dead
+_BEATS: Final = 4  # signs of life in a lifetime
+_POLL: Final = 1.0  # seconds between two looks at a study that has nothing to hand out
+_PATIENCE: Final = (
+    0.5,
+    1.0,
+    2.0,
+    5.0,
+    10.0,
+    30.0,
+    60.0,
+    60.0,
+    60.0,
+    60.0,
+)  # pauses before a failing storage is given up
+
+_log = logging.get_logger(__name__)
+
+
+def worker_name() -> str:
+    """Return a name that no other worker has: the host, the process and some random letters."""
+    return f"{socket.gethostname()}-{os.getpid()}-{uuid.uuid4().hex[:8]}"
+
+
+def work(
+    study: RobotStudy,
+    attempt: Callable[[Mapping[str, Any]], Outcome],
+    *,
+    name: str | None = None,
+    lifetime: float = LIFETIME,
+    most: int | None = None,
+    before: Callable[[Asked], Any] = lambda asked: None,
+    after: Callable[[Asked, Outcome], Any] = lambda asked, outcome: None,
+) -> int:
+    """Make trials until the study stops, and return how many.
+
+    Where it stops while others are still at their last trials, the worker stays until these have been told, or takes
+    them up. While the study is paused it waits.
+
+    Parameters
+    ----------
+    attempt
+        Makes one trial from its parameters, see `trial_function`.
+    name
+        Of the worker; by default one that no other has.
+    lifetime
+        Seconds of silence after which it counts as dead; a quarter of it passes between two signs of life.
+    most
+        Trials that this worker makes at most.
+    before, after
+        Called with each trial that was handed out, and with what came of it after it was stored.
+
+    Raises
+    ------
+    StorageFailure
+        If the storage was away for five minutes; the message names what could not be stored.
+    KeyboardInterrupt
+        On Ctrl-C; the trial under way is let go, so that another worker can take it up at once.
+    """
+    name = name or worker_name()
+    if not lifetime > 0.0:
+        raise InputError(f"lifetime is {lifetime!r}; give a positive number of seconds.")
+    made = 0
+    while most is None or made < most:
+        try:
+            asked = _patiently(lambda: study.ask(name, lifetime=lifetime), "no trial could be asked for")
+        except NothingToAsk as nothing:
+            if not nothing.paused and not _mortal(study):
+                break
+            time.sleep(_POLL)
+            continue
+        before(asked)
+        with _alive(study, asked.id, name, lifetime):
+            outcome = attempt(asked.parameters)
+        _tell(study, asked.id, outcome)
+        made += 1
+        after(asked, outcome)
+    return made
+
+
+def _tell(study: RobotStudy, id: int, outcome: Outcome) -> None:
+    failed = bool(outcome.failure)
+    value = None if failed else outcome.value
+    said = "failed" if failed else f"value {value!r}"
+    try:
+        _patiently(lambda: study.tell(id, value, failed=failed), f"trial {id} ({said}) could not be stored")
+    except StorageFailure:
+        raise
+    except InputError as error:  # another worker had taken the trial up, and was quicker
+        _log.warning(f"{error} (answer of this worker: {said})")
+
+
+def _mortal(study: RobotStudy) -> bool:
+    """Tell whether a trial is under way whose worker may die."""
+    running = [t for t in study.trials() if t.state == TrialState.RUNNING]
+    return any((holder := holder_of(t)) is not None and holder.until is not None for t in running)
+
+
+def _patiently(call: Callable[[], Any], otherwise: str) -> Any:
+    for pause in _PATIENCE:
+        try:
+            return call()
+        except StorageFailure as failure:
+            _log.warning(f"{otherwise} yet: {failure} Trying again in {pause:g} s.")
+            time.sleep(pause)
+    try:
+        return call()
+    except StorageFailure as failure:
+        raise StorageFailure(f"{otherwise}: {failure}") from failure
+
+
+@contextmanager
+def _alive(study: RobotStudy, id: int, name: str, lifetime: float) -> Iterator[None]:
+    """Give signs of life while the block runs; let go of the trial where it is interrupted."""
+    over = threading.Event()
+
+    def beat() -> None:
+        while not over.wait(lifetime / _BEATS):
+            try:
+                study.renew(id, name, lifetime)
+            except InputError as error:  # the storage is away: the next beat may reach it
+                _log.warning(f"no sign of life could be stored: {error}")
+
+    thread = threading.Thread(target=beat, name=f"surehold-alive-{id}", daemon=True)
+    thread.start()
+    try:
+        yield
+    except KeyboardInterrupt:
+        over.set()
+        thread.join()
+        study.renew(id, name, 0.0)
+        raise
+    finally:
+        over.set()
+        thread.join()
