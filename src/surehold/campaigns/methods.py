@@ -133,7 +133,7 @@ def checked_settings(where: str, optimizer: str, settings: Mapping[str, Any], ro
 def _treed(own: dict[str, Any], box: Box, input_noise: InputNoise | None, seed: int) -> Any:
     thesis = None if own.get("preset") is None else thesis_preset(own["preset"])
     changes = {name: own.pop(name) for name in _TREE if name in own}
-    process_settings = {name: own.get(name) for name in _PROCESS if own.get(name) is not None}
+    process_settings: dict[str, Any] = {name: own[name] for name in _PROCESS if own.get(name) is not None}
     if "weight_power" in changes:
         changes["weight_power"] = float(changes["weight_power"])
     if thesis is None:

@@ -139,7 +139,7 @@ class BoTorch:
     """BoTorch: SingleTaskGP and LogExpectedImprovement; with the noise known, its input perturbation.
 
     With `noise` (standard deviation in the unit cube) the model averages over 16 quasi-random perturbations, the
-    criterion is the noisy expected improvement of that average, and the answer the observed input with the best one.
+    criterion is the expected improvement of that average, and the answer the observed input with the best one.
     """
 
     def __init__(self, dimension: int, initial: Array, seed: int, noise: float | None = None):
@@ -147,12 +147,14 @@ class BoTorch:
 
         _one_torch_thread()
         torch.manual_seed(seed)
-        self._shifts = None
+        self._shifts = self._average = None
         if noise is not None:
+            from botorch.acquisition.objective import ExpectationPosteriorTransform
             from scipy.stats import qmc
 
             normals = qmc.MultivariateNormalQMC(np.zeros(dimension), rng=np.random.default_rng(seed)).random(16)
             self._shifts = torch.tensor(noise * normals)
+            self._average = ExpectationPosteriorTransform(n_w=len(normals))
         self._told = _Told(initial)
         self._model: tuple[int, Any] | None = None
 
@@ -161,21 +163,14 @@ class BoTorch:
         if self._told.waiting:
             return self._told.waiting.pop(0)
         import torch
-        from botorch.acquisition import LogExpectedImprovement, qLogNoisyExpectedImprovement
-        from botorch.acquisition.risk_measures import Expectation
+        from botorch.acquisition import LogExpectedImprovement
         from botorch.optim import optimize_acqf
 
         X = torch.tensor(np.array(self._told.X))
-        y = torch.tensor(np.array(self._told.y))
-        model = self._fitted()
+        best = max(self._told.y) if self._shifts is None else float(self._averages().max())
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            if self._shifts is None:
-                criterion: Any = LogExpectedImprovement(model, best_f=y.max())
-            else:
-                criterion = qLogNoisyExpectedImprovement(
-                    model, X, objective=Expectation(n_w=len(self._shifts)), prune_baseline=True
-                )
+            criterion = LogExpectedImprovement(self._fitted(), best, posterior_transform=self._average)
             bounds = torch.stack([torch.zeros(X.shape[1]), torch.ones(X.shape[1])]).to(X)
             found, _ = optimize_acqf(criterion, bounds, q=1, num_restarts=10, raw_samples=256)
         return found[0].numpy()
@@ -188,12 +183,18 @@ class BoTorch:
         """Return the highest observed; with the noise known, the observed input whose average is expected best."""
         if self._shifts is None:
             return self._told.best()
+        return self._told.X[int(self._averages().argmax())]
+
+    def _averages(self) -> Any:
         import torch
 
+        model = self._fitted()
         with torch.no_grad(), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            mean = self._fitted().posterior(torch.tensor(np.array(self._told.X))).mean
-        return self._told.X[int(mean.reshape(len(self._told.X), -1).mean(dim=1).argmax())]
+            posterior = model.posterior(
+                torch.tensor(np.array(self._told.X))[:, None], posterior_transform=self._average
+            )
+        return posterior.mean.reshape(-1)
 
     def _fitted(self) -> Any:
         n = len(self._told.y)

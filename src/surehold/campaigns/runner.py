@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from surehold.campaigns.plan import Plan, Task
 from surehold.campaigns.single_run import run_once
@@ -149,17 +149,17 @@ def _spread(tasks: Sequence[Task], workers: int, kind: str, backend: str) -> Ite
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    settings: dict[str, Any] = {"n_jobs": workers, "batch_size": 1}
+    settings: dict[str, Any] = {"n_jobs": workers, "batch_size": 1, "pre_dispatch": workers}
     try:
         with _cluster(kind, checked_backend(backend)[1], workers):
             if kind == "ray":
                 with Parallel(**settings) as parallel:
                     for i in range(0, len(tasks), workers):
-                        yield from parallel(delayed(run_once)(*task) for task in tasks[i : i + workers])
+                        rows = parallel(delayed(run_once)(*task) for task in tasks[i : i + workers])
+                        yield from cast(list[dict[str, Any]], rows)
             else:
-                yield from Parallel(**settings, pre_dispatch=workers, return_as="generator_unordered")(
-                    delayed(run_once)(*task) for task in tasks
-                )
+                parallel = Parallel(**settings, return_as="generator_unordered")
+                yield from cast(Iterator[dict[str, Any]], parallel(delayed(run_once)(*task) for task in tasks))
     except TerminatedWorkerError:
         raise SureholdError(
             "a worker process died, killed by the system or out of memory; the finished runs are kept. Start again, "
@@ -180,7 +180,7 @@ def _cluster(kind: str, address: str, workers: int) -> Iterator[None]:
             cluster: Any = f"tcp://{address}"
             if not address:
                 cluster = stack.enter_context(
-                    LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
+                    LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0")
                 )
             settings["client"] = stack.enter_context(Client(cluster))
         elif kind == "ray":
@@ -190,7 +190,7 @@ def _cluster(kind: str, address: str, workers: int) -> Iterator[None]:
             register_ray()
             if not ray.is_initialized():
                 options: dict[str, Any] = {"address": f"ray://{address}"} if address else {"num_cpus": workers}
-                ray.init(include_dashboard=False, log_to_driver=False, logging_level="ERROR", **options)
+                ray.init(include_dashboard=False, log_to_driver=False, logging_level=40, **options)
                 stack.callback(ray.shutdown)
         else:
             settings["inner_max_num_threads"] = 1

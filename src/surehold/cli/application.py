@@ -3,6 +3,7 @@
 import typer
 
 from surehold import __version__
+from surehold.cli.campaign import campaigns
 from surehold.cli.doctor import doctor
 from surehold.cli.grasp import grasp
 from surehold.cli.maximize import maximize
@@ -24,6 +25,7 @@ def application() -> typer.Typer:
     app.command()(grasp)
     app.command()(maximize)
     app.command()(doctor)
+    app.add_typer(campaigns(), name="campaign")
 
     def show_version(asked: bool) -> None:
         if asked:

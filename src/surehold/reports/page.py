@@ -1,7 +1,7 @@
 """One run as one HTML file that opens without network: text, pictures and the 3-D scene are all inside."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,9 +12,9 @@ from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.scene import scene_data
 from surehold.reports.verdict import change, coordinates, halved, number, verdict
 
-__all__ = ["render", "table_rows"]
+__all__ = ["TEMPLATES", "environment", "render", "scene_context", "table_rows"]
 
-_TEMPLATES: Final = Path(__file__).parent / "templates"
+TEMPLATES: Final = Path(__file__).parent / "templates"
 
 
 def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
@@ -32,46 +32,67 @@ def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
     InputError
         If a scene of the report is malformed or too large.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
     from surehold import __version__
 
-    environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES),
+    told = verdict(report)
+    if drawings is None:
+        drawings = {name: figures.svg_text(figure, name) for name, figure in figures.figures(report).items()}
+    shown = [c for c in report.candidates if c.scene is not None]
+    return (
+        environment()
+        .get_template("report.html.j2")
+        .render(
+            report=report,
+            verdict=told,
+            version=__version__,
+            css=Markup((TEMPLATES / "report.css").read_text(encoding="utf-8")),
+            n_initial=min(report.n_initial, report.y.size),
+            n_failed=int(report.failed.sum()),
+            noise_text=_noise_text(report),
+            two=len(report.candidates) > 1,
+            cards=[_card(report, c, told.refused, drawings) for c in report.candidates],
+            maps=[_map(report, i, drawings) for i in range(len(report.surfaces))],
+            trace=Markup(figures.inline_svg(drawings["trace"], "trace", "Best and robust value by trial")),
+            rows=table_rows(report),
+            settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
+            trials=_trials(report),
+            **scene_context(shown, [_scene_note(c) for c in shown], [_label(report, c) for c in shown]),
+        )
+    )
+
+
+def environment() -> Any:
+    """Return what renders the templates: everything escaped, nothing undefined."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    return Environment(
+        loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    told = verdict(report)
-    if drawings is None:
-        drawings = {name: figures.svg_text(figure, name) for name, figure in figures.figures(report).items()}
-    scene = scene_data(report.candidates)
+
+
+def scene_context(
+    shown: Sequence[Candidate], notes: Sequence[str] = (), labels: Sequence[Mapping[str, str]] = ()
+) -> dict[str, Any]:
+    """Return what the templates of the 3-D scene need: one view, button and note for each candidate shown."""
+    from markupsafe import Markup
+
+    scene = scene_data(tuple(shown))
     if scene is not None:
-        for view, candidate in zip(scene["views"], (c for c in report.candidates if c.scene is not None), strict=True):
-            view["note"] = _scene_note(candidate)
-    return environment.get_template("report.html.j2").render(
-        report=report,
-        verdict=told,
-        version=__version__,
-        css=Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8")),
-        n_initial=min(report.n_initial, report.y.size),
-        n_failed=int(report.failed.sum()),
-        noise_text=_noise_text(report),
-        two=len(report.candidates) > 1,
-        cards=[_card(report, c, told.refused, drawings) for c in report.candidates],
-        scene=None if scene is None else Markup(_json_for_html(scene)),
-        scene_labels=[_label(report, c) for c in report.candidates if c.scene is not None],
-        scene_has_box=any(c.scene is not None and c.scene.box is not None for c in report.candidates),
-        three=Markup("" if scene is None else _vendored("three.bundle.min.js")),
-        scene_script=Markup((_TEMPLATES / "scene.js").read_text(encoding="utf-8")),
-        maps=[_map(report, i, drawings) for i in range(len(report.surfaces))],
-        trace=Markup(figures.inline_svg(drawings["trace"], "trace", "Best and robust value by trial")),
-        rows=table_rows(report),
-        settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
-        trials=_trials(report),
-    )
+        for i, (view, candidate) in enumerate(zip(scene["views"], shown, strict=True)):
+            view["note"] = notes[i] if notes else f"{candidate.label}."
+    return {
+        "scene": None if scene is None else Markup(_json_for_html(scene)),
+        "scene_labels": list(labels) or [{"role": "answer", "mark": "", "text": c.label} for c in shown],
+        "scene_has_box": any(c.scene is not None and c.scene.box is not None for c in shown),
+        "three": Markup("" if scene is None else _vendored("three.bundle.min.js")),
+        "scene_script": Markup((TEMPLATES / "scene.js").read_text(encoding="utf-8")),
+    }
 
 
 def _json_for_html(data: Any) -> str:
@@ -81,7 +102,7 @@ def _json_for_html(data: Any) -> str:
 
 
 def _vendored(name: str) -> str:
-    return (_TEMPLATES / "vendor" / name).read_text(encoding="utf-8")
+    return (TEMPLATES / "vendor" / name).read_text(encoding="utf-8")
 
 
 def _label(report: RunReport, candidate: Candidate) -> dict[str, str]:

@@ -1,0 +1,222 @@
+"""Our runs beside the published numbers and beside each other: rows, verdicts, paired tests, claims."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.campaigns.published import Published, published
+from surehold.campaigns.single_run import expanded
+from surehold.campaigns.statistics import LEVEL, Paired, Summary, holm, p_against, paired, summary
+from surehold.campaigns.table import Records
+from surehold.campaigns.thesis import CLAIMS, Claim, exhibit_of
+
+__all__ = ["ClaimResult", "Comparison", "Row", "claim_results", "comparisons", "final_values", "measures_of", "rows_of"]
+
+#: Measures that are better when they are low.
+LOWER: Final = ("std",)
+LABELS: Final = {
+    "best": "best observed value",
+    "mean": "mean under input noise",
+    "worst": "worst of the re-queries",
+    "std": "standard deviation of the re-queries",
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One problem, method and measure: our runs, and the published number where there is one."""
+
+    problem: str
+    method: str
+    measure: str
+    planned: int
+    failed: int
+    ours: Summary | None
+    """None while no run is finished"""
+    theirs: Published | None
+    p: float
+    """of equal means, Holm-adjusted within the table; NaN where nothing is compared"""
+    verdict: str
+    """"agrees", "better", "differs", or empty"""
+    seconds: float
+    """mean CPU seconds of a run; NaN without runs"""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two methods on common seeds."""
+
+    problem: str
+    measure: str
+    method: str
+    reference: str
+    difference: Paired
+    """method - reference"""
+    p: float
+    """Holm-adjusted within the campaign"""
+    verdict: str
+    """"better", "worse" or "no difference shown" """
+
+
+@dataclass(frozen=True)
+class ClaimResult:
+    """A claim of the thesis and what the runs say."""
+
+    claim: Claim
+    plan: str
+    result: Paired | None
+    p: float
+    """Holm-adjusted within the table"""
+    verdict: str
+    """"holds", "not shown", "contradicted" or "no runs" """
+
+
+def measures_of(records: Records) -> tuple[str, ...]:
+    """Return the measures by which a campaign compares: the thesis' table's, or robust ones where there is noise."""
+    exhibit = exhibit_of(records.header["plan"])
+    if exhibit is not None:
+        return exhibit.measures
+    noisy = any(cell["input_noise"] is not None for cell in records.header["cells"])
+    return ("mean", "worst", "std") if noisy else ("best",)
+
+
+def final_values(records: Records, problem: str, method: str, measure: str) -> dict[int, float]:
+    """Return what the finished runs ended with, by seed."""
+    found = {}
+    for (p, m, seed), row in records.done.items():
+        if (p, m) == (problem, method) and measure in row:
+            value = row[measure][-1][1]
+            if value is not None:
+                found[seed] = float(value)
+    return dict(sorted(found.items()))
+
+
+def traces(records: Records, problem: str, method: str, measure: str) -> NDArray[np.float64]:
+    """Return the traces of the finished runs (n, trials)."""
+    rows = [row for (p, m, _), row in sorted(records.done.items()) if (p, m) == (problem, method) and measure in row]
+    return np.array([expanded(row[measure], row["trials"]) for row in rows])
+
+
+def rows_of(records: Records) -> list[Row]:
+    """Return the rows of a campaign's table, with verdicts beside the published numbers."""
+    exhibit = exhibit_of(records.header["plan"])
+    rows = []
+    for measure in measures_of(records):
+        for cell in records.header["cells"]:
+            problem, method = cell["problem"], cell["method"]
+            values = list(final_values(records, problem, method, measure).values())
+            theirs = None if exhibit is None else published(exhibit.table, problem, method, measure)
+            own = [row for (p, m, _), row in records.done.items() if (p, m) == (problem, method)]
+            lost = sum((p, m) == (problem, method) for p, m, _ in records.failed)
+            p = math.nan
+            if values and theirs is not None:
+                p = p_against(values, theirs.mean, theirs.std, theirs.runs)
+            rows.append(
+                Row(
+                    problem,
+                    method,
+                    measure,
+                    records.header["runs"],
+                    lost,
+                    summary(values) if values else None,
+                    theirs,
+                    p,
+                    "",
+                    float(np.mean([row["cpu_seconds"] for row in own])) if own else math.nan,
+                )
+            )
+    adjusted = _holm_where([row.p for row in rows])
+    return [_judged(row, p) for row, p in zip(rows, adjusted, strict=True)]
+
+
+def comparisons(records: Records) -> list[Comparison]:
+    """Return every method beside the plan's first one, on common seeds; Holm over all of them."""
+    methods = list(dict.fromkeys(cell["method"] for cell in records.header["cells"]))
+    problems = list(dict.fromkeys(cell["problem"] for cell in records.header["cells"]))
+    found = []
+    for measure in measures_of(records):
+        for problem in problems:
+            for method in methods[1:]:
+                difference = _difference(records, problem, method, methods[0], measure)
+                if difference is not None:
+                    found.append((problem, measure, method, difference))
+    adjusted = holm([difference.p for *_, difference in found])
+    return [
+        Comparison(problem, measure, method, methods[0], difference, p, _word(difference, p, measure))
+        for (problem, measure, method, difference), p in zip(found, adjusted, strict=True)
+    ]
+
+
+def claim_results(campaigns: Mapping[str, Records]) -> list[ClaimResult]:
+    """Return what the campaigns (by plan) say of the thesis' claims; Holm within each plan."""
+    results = []
+    for plan in dict.fromkeys(c.plan for c in CLAIMS):
+        for name in (plan, f"{plan}-defaults"):
+            claims = [claim for claim in CLAIMS if claim.plan == plan]
+            records = campaigns.get(name)
+            told = [
+                None if records is None else _difference(records, c.problem, c.better, c.than, c.measure)
+                for c in claims
+            ]
+            adjusted = _holm_where([math.nan if t is None else t.p for t in told])
+            results += [
+                ClaimResult(claim, name, t, p, _claim_word(claim, t, p))
+                for claim, t, p in zip(claims, told, adjusted, strict=True)
+            ]
+    return results
+
+
+def _difference(records: Records, problem: str, method: str, reference: str, measure: str) -> Paired | None:
+    ours = final_values(records, problem, method, measure)
+    theirs = final_values(records, problem, reference, measure)
+    common = [seed for seed in ours if seed in theirs]
+    if len(common) < 2:
+        return None
+    return paired([ours[seed] for seed in common], [theirs[seed] for seed in common])
+
+
+def _word(difference: Paired, p: float, measure: str) -> str:
+    if not p < LEVEL or difference.r == 0.0:
+        return "no difference shown"
+    return "better" if (difference.r > 0.0) != (measure in LOWER) else "worse"
+
+
+def _claim_word(claim: Claim, difference: Paired | None, p: float) -> str:
+    if difference is None:
+        return "no runs"
+    word = _word(difference, p, claim.measure)
+    if claim.expected == "no better":
+        return "contradicted" if word == "better" else "holds"
+    return {"better": "holds", "worse": "contradicted"}.get(word, "not shown")
+
+
+def _judged(row: Row, p: float) -> Row:
+    verdict = ""
+    if row.ours is not None and row.theirs is not None:
+        gap = row.ours.mean - row.theirs.mean
+        rounded = abs(gap) <= 0.5 * row.theirs.unit
+        if rounded or p >= LEVEL:
+            verdict = "agrees"
+        elif math.isnan(p):
+            verdict = ""
+        else:
+            verdict = "better" if (gap > 0.0) != (row.measure in LOWER) else "differs"
+    return Row(**{**row.__dict__, "p": p, "verdict": verdict})
+
+
+def _holm_where(p: Iterable[float]) -> list[float]:
+    """Return adjusted p-values; NaN stays and does not count."""
+    values = list(p)
+    places = [i for i, value in enumerate(values) if not math.isnan(value)]
+    for i, adjusted in zip(places, holm([values[i] for i in places]), strict=True):
+        values[i] = adjusted
+    return values
+
+
+def as_data(value: Any) -> Any:
+    """Return a number for a CSV: empty where it is missing."""
+    return "" if value is None or (isinstance(value, float) and math.isnan(value)) else value
