@@ -44,24 +44,24 @@ def _kernel() -> Picture:
 
 
 def _transformation() -> Picture:
-    """Propagate N(0.35, 0.09^2) through a bend: the true density beside linearization and sigma points."""
-    center, deviation = 0.35, 0.09
+    """Propagate N(0.35, 0.2^2) through exp(3 x): the true density beside linearization and sigma points."""
+    from scipy.special import ndtri
+
+    center, deviation = 0.35, 0.2
 
     def bend(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.sin(4.0 * x) + 0.3 * np.cos(13.0 * x)
+        return np.exp(3.0 * x)
 
-    slope = 4.0 * np.cos(4.0 * center) - 3.9 * np.sin(13.0 * center)
+    slope = 3.0 * np.exp(3.0 * center)
     offsets, weights = sigma_points(np.array([[deviation**2]]))[:2]
     values = bend(center + np.asarray(offsets)[:, 0])
     mean = float(weights @ values)
     std = float(np.sqrt(weights @ (values - mean) ** 2))
     quantiles = (np.arange(200_000) + 0.5) / 200_000
-    from scipy.special import ndtri
-
     outcome = bend(center + deviation * ndtri(quantiles))
-    counts, edges = np.histogram(outcome, 160, density=True)
-    y = np.linspace(float(outcome.min()) - 0.4, float(outcome.max()) + 0.3, 400)
-    x = np.linspace(center - 4 * deviation, center + 4 * deviation, 400)
+    counts, edges = np.histogram(outcome, 160, range=(0.0, 12.0), density=True)
+    y = np.linspace(-3.0, 12.0, 400)
+    x = np.linspace(center - 3 * deviation, center + 3 * deviation, 400)
     function = Panel(
         "The function and the sigma points",
         "x",
@@ -73,7 +73,7 @@ def _transformation() -> Picture:
         points=(Points(center + np.asarray(offsets)[:, 0], values, "sigma points"),),
     )
     densities = Panel(
-        "Density of f(x), x ~ N(0.35, 0.09²)",
+        "Density of f(x), x ~ N(0.35, 0.2²)",
         "f(x)",
         "density",
         (

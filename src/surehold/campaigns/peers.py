@@ -143,13 +143,15 @@ class BoTorch:
     """
 
     def __init__(self, dimension: int, initial: Array, seed: int, noise: float | None = None):
-        import torch
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # importing it warns
+            import torch
+            from botorch.acquisition.objective import ExpectationPosteriorTransform
 
         _one_torch_thread()
         torch.manual_seed(seed)
         self._shifts = self._average = None
         if noise is not None:
-            from botorch.acquisition.objective import ExpectationPosteriorTransform
             from scipy.stats import qmc
 
             normals = qmc.MultivariateNormalQMC(np.zeros(dimension), rng=np.random.default_rng(seed)).random(16)
@@ -163,13 +165,14 @@ class BoTorch:
         if self._told.waiting:
             return self._told.waiting.pop(0)
         import torch
-        from botorch.acquisition import LogExpectedImprovement
-        from botorch.optim import optimize_acqf
 
         X = torch.tensor(np.array(self._told.X))
         best = max(self._told.y) if self._shifts is None else float(self._averages().max())
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
+            from botorch.acquisition import LogExpectedImprovement
+            from botorch.optim import optimize_acqf
+
             criterion = LogExpectedImprovement(self._fitted(), best, posterior_transform=self._average)
             bounds = torch.stack([torch.zeros(X.shape[1]), torch.ones(X.shape[1])]).to(X)
             found, _ = optimize_acqf(criterion, bounds, q=1, num_restarts=10, raw_samples=256)
@@ -200,15 +203,16 @@ class BoTorch:
         n = len(self._told.y)
         if self._model is None or self._model[0] != n:
             import torch
-            from botorch.fit import fit_gpytorch_mll
-            from botorch.models import SingleTaskGP
-            from botorch.models.transforms.input import InputPerturbation
-            from gpytorch.mlls import ExactMarginalLogLikelihood
 
             y = torch.tensor(np.array(self._told.y))[:, None]
-            transform = None if self._shifts is None else InputPerturbation(self._shifts)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
+                from botorch.fit import fit_gpytorch_mll
+                from botorch.models import SingleTaskGP
+                from botorch.models.transforms.input import InputPerturbation
+                from gpytorch.mlls import ExactMarginalLogLikelihood
+
+                transform = None if self._shifts is None else InputPerturbation(self._shifts)
                 model = SingleTaskGP(torch.tensor(np.array(self._told.X)), y, input_transform=transform)
                 fit_gpytorch_mll(ExactMarginalLogLikelihood(model.likelihood, model))
                 model.eval()

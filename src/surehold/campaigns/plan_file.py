@@ -127,7 +127,8 @@ def _plan_of(document: dict[str, Any], name: str) -> Plan:
     try:
         told = Document.model_validate(document)
     except ValidationError as error:
-        raise _explained(error.errors()[0], name, {"": Document, "problems": Problem, "methods": Method}) from None
+        first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")  # a misspelt key is missing, too
+        raise _explained(first, name, {"": Document, "problems": Problem, "methods": Method}) from None
     return Plan(
         name,
         told.title,

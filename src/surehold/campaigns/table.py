@@ -9,7 +9,7 @@ import fcntl
 import gzip
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -66,15 +66,18 @@ class Table:
             If it cannot be written; everything before it stays.
         """
         raw = _line(row)
-        size = self.path.stat().st_size
         try:
-            with open(self.path, "ab", buffering=0) as file:
-                written = file.write(raw)
-                if written != len(raw):  # the disk filled up inside the row
-                    file.write(raw[written:])  # raises what is the matter
-                os.fsync(file.fileno())
+            with open(self.path, "r+b", buffering=0) as file:
+                size = file.seek(0, os.SEEK_END)
+                try:
+                    written = file.write(raw)
+                    if written != len(raw):  # the disk filled up inside the row
+                        file.write(raw[written:])  # raises what is the matter
+                    os.fsync(file.fileno())
+                except OSError:
+                    file.truncate(size)
+                    raise
         except OSError as error:
-            os.truncate(self.path, size)
             raise SureholdError(
                 f"table '{self.path}' cannot be written ({error.strerror or error}); its {len(self.records.rows)} runs "
                 "are kept. Free space and start again: the campaign continues where it was."
@@ -168,14 +171,25 @@ def read_folder(folder: str | Path) -> Records:
     return records
 
 
-def pack(folder: str | Path, target: str | Path) -> Path:
-    """Write all rows of a folder's tables as one compressed table into the folder `target`; return its path."""
-    records = read_folder(folder)
-    rows = sorted(records.rows.values(), key=lambda row: (row["seed"], row["problem"], row["method"]))
-    raw = b"".join([_line(records.header), *map(_line, rows)])
-    path = checked_folder(target) / PACKED
-    write_file(path, gzip.compress(raw, 9, mtime=0))
-    return path
+def pack(folders: Sequence[str | Path], target: str | Path) -> Path:
+    """Write the rows of several folders of one plan as one compressed table into the folder `target`; return its path.
+
+    Of runs that several folders hold, the first one's are kept; the target's own plain tables become part of it.
+    """
+    first, *others = [read_folder(folder) for folder in folders]
+    for other in others:
+        if other.header["plan"] != first.header["plan"]:
+            raise InputError(f"plans '{first.header['plan']}' and '{other.header['plan']}' do not go into one table.")
+        for key, row in other.rows.items():
+            first.rows.setdefault(key, row)
+    rows = sorted(first.rows.values(), key=lambda row: (row["seed"], row["problem"], row["method"]))
+    raw = b"".join([_line(first.header), *map(_line, rows)])
+    place = checked_folder(target)
+    write_file(place / PACKED, gzip.compress(raw, 9, mtime=0))
+    if place in [Path(folder) for folder in folders]:
+        for plain in [*place.glob("table*.jsonl"), *place.glob("table*.lock")]:
+            plain.unlink()
+    return place / PACKED
 
 
 @contextmanager

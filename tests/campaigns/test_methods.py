@@ -1,0 +1,43 @@
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from surehold.campaigns.methods import METHODS, build_method
+from surehold.campaigns.peers import PEERS, REQUIRES, installed_peers
+from surehold.campaigns.plan import MethodSetup, Plan, ProblemSetup
+from surehold.errors import InputError
+
+
+def hill(u):
+    return 1.0 - float(np.sum((u - 0.3) ** 2))
+
+
+@pytest.mark.parametrize("robust", [False, True])
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_asks_first_for_the_design_and_answers_with_a_good_point(name, robust):
+    if name in PEERS and name not in installed_peers():
+        pytest.skip(f"{', '.join(REQUIRES[name])} is not installed")
+    if robust and name not in ("surehold", "botorch"):
+        pytest.skip(f"{name} cannot be told of input noise")
+    plan = Plan("p", "t", {"a": ProblemSetup("gf", 9, 6, input_noise=0.05)}, {"m": MethodSetup(name, robust)})
+    initial = qmc.LatinHypercube(2, rng=1).random(6)
+    method = build_method(plan.cells()[0], 2, initial, 0)
+    asked = []
+    for _ in range(9):
+        u = np.asarray(method.ask())
+        asked.append(u)
+        method.tell(u, hill(u))
+    assert np.array(asked[:6]) == pytest.approx(initial)
+    assert np.all((np.array(asked) >= 0.0) & (np.array(asked) <= 1.0))
+    answer = np.asarray(method.answer())
+    assert answer.shape == (2,)
+    assert hill(answer) >= np.median([hill(u) for u in asked])
+    if not robust:
+        assert hill(answer) == pytest.approx(max(hill(u) for u in asked))
+
+
+def test_a_missing_library_is_named(monkeypatch):
+    monkeypatch.setitem(REQUIRES, "optuna-tpe", ("no_such_library",))
+    plan = Plan("p", "t", {"a": ProblemSetup("gf", 9, 6)}, {"m": MethodSetup("optuna-tpe")})
+    with pytest.raises(InputError, match="no_such_library"):
+        build_method(plan.cells()[0], 2, np.zeros((6, 2)), 0)
