@@ -7,6 +7,7 @@ from surehold.cli.campaign import campaigns
 from surehold.cli.doctor import doctor
 from surehold.cli.grasp import grasp
 from surehold.cli.maximize import maximize
+from surehold.cli.study import studies
 
 __all__ = ["application"]
 
@@ -26,6 +27,7 @@ def application() -> typer.Typer:
     app.command()(maximize)
     app.command()(doctor)
     app.add_typer(campaigns(), name="campaign")
+    app.add_typer(studies(), name="study")
 
     def show_version(asked: bool) -> None:
         if asked:

@@ -175,13 +175,12 @@ class _JournalLock:
 
     def __init__(self, journal: Path):
         self._journal = journal
-        self._path = journal.with_suffix(journal.suffix + ".lock")
         self._held = threading.local()
 
     def acquire(self) -> bool:
         import fcntl
 
-        file = open(self._path, "ab")  # noqa: SIM115
+        file = open(self._journal, "ab")  # noqa: SIM115
         fcntl.flock(file, fcntl.LOCK_EX)
         self._held.file = file
         self._mend()

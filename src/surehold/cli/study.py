@@ -1,0 +1,217 @@
+"""`surehold study`: studies that survive, for robots in any language: every command can answer in JSON."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from surehold.cli import study_people, study_service
+from surehold.cli.study_options import Json, Name, Storage, opened, quiet, say
+
+__all__ = ["studies"]
+
+
+def studies() -> typer.Typer:
+    """Return the group of commands."""
+    group = typer.Typer(
+        help="Studies whose trials a robot, a person or workers make: stored, resumable, shared.",
+        no_args_is_help=True,
+        rich_markup_mode=None,
+    )
+    commands: list[tuple[str, Callable[..., Any]]] = [
+        ("create", create),
+        ("ask", ask),
+        ("tell", tell),
+        ("recommend", recommend),
+        ("status", status),
+        ("export", export),
+        *study_people.commands(),
+        *study_service.commands(),
+    ]
+    for name, command in commands:
+        group.command(name)(command)
+    return group
+
+
+def create(
+    name: Name,
+    parameters: Annotated[
+        str,
+        typer.Option(
+            help="dx=-0.05:0.05,force=0.1:100:log,fingers=2:5:int,turn=0:1:step=0.25,grip=pinch|power",
+            show_default=False,
+        ),
+    ] = "",
+    noise: Annotated[
+        str,
+        typer.Option(help="Input noise: a share of every range (0.03), or NAME=DEVIATION,... in their units, or none."),
+    ] = "0.03",
+    units: Annotated[str, typer.Option(help="NAME=UNIT,..., such as dx=m,turn=rad.", show_default=False)] = "",
+    problem: Annotated[
+        str,
+        typer.Option(
+            help="What workers try: rkhs, gm, gf, gf-stretched, package.module:function or path/file.py:function.",
+            show_default=False,
+        ),
+    ] = "",
+    seed: Annotated[int, typer.Option(help="Same seed, same suggestions.")] = 0,
+    initial: Annotated[int | None, typer.Option(help="Trials of the initial design.")] = None,
+    surrogate: Annotated[str, typer.Option(help="gp or tgp; by default gp, and tgp from 400 trials on.")] = "",
+    criterion: Annotated[str, typer.Option(help="As in surehold.Optimizer.", show_default=False)] = "",
+    risk: Annotated[str, typer.Option(help="mean, mean-std, var, cvar or worst.")] = "mean",
+    observation_noise: Annotated[
+        str, typer.Option(help="Of the values: none, inferred, heteroscedastic, or a standard deviation.")
+    ] = "none",
+    preset: Annotated[str, typer.Option(help="Settings by name, such as thesis.", show_default=False)] = "",
+    storage: Storage = "",
+    as_json: Json = False,
+) -> None:
+    """Create a study; values are maximized."""
+    from surehold.cli.options import noise_of
+    from surehold.studies.parameter_text import parse_assignments
+    from surehold.studies.robot import RobotStudy
+    from surehold.studies.settings import StudySettings
+
+    space, described = _space_of(parameters, problem)
+    optimizer: dict[str, Any] = {"seed": seed}
+    optimizer |= {} if initial is None else {"n_initial": initial}
+    optimizer |= {} if risk == "mean" else {"risk": risk}
+    optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
+    optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
+    input_noise = None if noise.strip().lower() == "none" else noise_of(noise, "bo")
+    if space.numbers is None:
+        input_noise = None  # choices carry none
+    settings = StudySettings(
+        space, input_noise, parse_assignments(units, "--units") if units else {}, optimizer, described
+    )
+    quiet()
+    study = RobotStudy.create(name, settings, storage)
+    found = {"name": name, "storage": study.storage.shown, **settings.to_json()}
+    say(found, f"Created study {name} in {study.storage.shown}: {', '.join(space.distributions)}.", as_json)
+
+
+def ask(
+    name: Name,
+    worker: Annotated[
+        str, typer.Option(help="Who makes the trial; asked again before it was told, that one gets the same trial.")
+    ] = "",
+    storage: Storage = "",
+    as_json: Json = False,
+) -> None:
+    """Hand out the next trial: its id and parameters."""
+    from surehold.studies.robot import NothingToAsk
+
+    study = opened(name, storage)
+    try:
+        asked = study.ask(worker or None)
+    except NothingToAsk as nothing:
+        if as_json:
+            typer.echo(
+                json.dumps({"id": None, "state": "paused" if nothing.paused else "stopped", "reason": str(nothing)})
+            )
+        raise
+    found = {"id": asked.id, "parameters": asked.parameters, "units": asked.units, "again": asked.again}
+    lines = [f"trial {asked.id}{' (handed out again)' * asked.again}"]
+    lines += [f"  {key} = {value} {asked.units.get(key, '')}".rstrip() for key, value in asked.parameters.items()]
+    say(found, "\n".join(lines), as_json)
+
+
+def tell(
+    name: Name,
+    id: Annotated[int, typer.Argument(help="Of the trial, as ask printed it.")],
+    value: Annotated[str | None, typer.Argument(help="Outcome, larger is better.", show_default=False)] = None,
+    failed: Annotated[bool, typer.Option("--failed", help="The trial gave nothing.")] = False,
+    reached: Annotated[
+        str, typer.Option(help="What was truly reached, where it differs: NAME=VALUE,...", show_default=False)
+    ] = "",
+    storage: Storage = "",
+    as_json: Json = False,
+) -> None:
+    """Tell what came of a trial; the same answer twice is harmless, another one is refused."""
+    from surehold.studies.parameter_text import parse_assignments
+
+    places = parse_assignments(reached, "--reached") if reached else None
+    told = opened(name, storage).tell(id, value, failed=failed, reached=places)
+    outcome = "failed" if told.value is None else f"value {told.value!r}"
+    found = {"id": told.id, "state": told.state, "value": told.value, "already": told.already}
+    say(found, f"trial {told.id}: {outcome}{', as told before' * told.already}", as_json)
+
+
+def recommend(name: Name, storage: Storage = "", as_json: Json = False) -> None:
+    """Recommend the trial that still holds when the input is off, and note it in the study."""
+    study = opened(name, storage)
+    best = study.recommend()
+    lines = [f"trial {best.trial}: expect {best.mean:.4g} ± {best.std:.2g}, 95 % better than {best.quantile:.4g}"]
+    units = study.settings.units
+    lines += [f"  {key} = {value} {units.get(key, '')}".rstrip() for key, value in best.parameters.items()]
+    lines += [best.refused] if best.refused else []
+    say(best.as_dict() | {"units": dict(units)}, "\n".join(lines), as_json)
+
+
+def status(name: Name, storage: Storage = "", as_json: Json = False) -> None:
+    """Show the state of a study, and the trials under way."""
+    from surehold.studies.status import status as status_of
+
+    found = status_of(opened(name, storage))
+    lines = [
+        f"study {name} in {found['storage']}: {found['state']}{' - ' * bool(found['reason'])}{found['reason']}",
+        f"  {found['trials']} trials: {found['complete']} complete, {found['failed']} failed, "
+        f"{found['running']} running, {found['waiting']} waiting",
+    ]
+    if found["highest_value"] is not None:
+        lines.append(f"  highest value {found['highest_value']:.6g} (trial {found['highest_trial']})")
+    for pending in found["pending"]:
+        age = "" if pending["seconds"] is None else f", {pending['seconds']:.0f} s"
+        who = f", {pending['worker']}" if pending["worker"] else ""
+        lines.append(
+            f"  trial {pending['id']} {pending['state']}{age}{who}{', dead' * (pending['worker_alive'] is False)}"
+        )
+    say(found, "\n".join(lines), as_json)
+
+
+def export(
+    name: Name,
+    out: Annotated[str, typer.Option(help="File to write; by default the standard output.", show_default=False)] = "",
+    storage: Storage = "",
+    as_json: Json = False,
+) -> None:
+    """Write all trials as CSV, or with --json as JSON with the settings."""
+    from surehold.reports.files import write_file
+    from surehold.studies.status import to_csv, to_json
+
+    study = opened(name, storage)
+    text = to_json(study) if as_json else to_csv(study)
+    if out:
+        write_file(Path(out), text)
+    else:
+        typer.echo(text, nl=False)
+
+
+def _space_of(parameters: str, problem: str) -> tuple[Any, dict[str, Any]]:
+    """Return the search space, and the description of what workers try."""
+    from surehold.errors import InputError, unknown_name
+    from surehold.problems import load_function, synthetic_function
+    from surehold.problems.synthetic import SYNTHETIC
+    from surehold.studies.parameter_text import parse_search_space
+    from surehold.studies.search_space import SearchSpace
+
+    if problem and ":" not in problem:
+        if problem not in SYNTHETIC:
+            raise unknown_name("problem", problem, [*SYNTHETIC, "package.module:function", "path/file.py:function"])
+        if parameters:
+            raise InputError(f"problem '{problem}' has its own parameters; leave --parameters out.")
+        return SearchSpace(synthetic_function(problem).box), {"synthetic": problem}
+    if not parameters:
+        raise InputError("--parameters are missing; give for example --parameters dx=-0.05:0.05,dy=0:1.")
+    if problem:
+        load_function(problem)
+    return parse_search_space(parameters), {"function": problem} if problem else {}
+
+
+def _number_or_word(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,58 @@
+"""What runs beside a study: workers, the HTTP service, the dashboard, the report."""
+
+import signal
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+from surehold.cli.study_options import Name, Storage, opened
+
+__all__ = ["commands"]
+
+
+def commands() -> list[tuple[str, Callable[..., Any]]]:
+    """Return the commands by name."""
+    return [("work", work)]
+
+
+def work(
+    name: Name,
+    function: Annotated[
+        str, typer.Option(help="package.module:function or path/file.py:function, if not the study's own problem.")
+    ] = "",
+    trials: Annotated[int | None, typer.Option(help="Trials that this worker makes at most.")] = None,
+    lifetime: Annotated[
+        float, typer.Option(help="Seconds of silence after which this worker counts as dead and loses its trial.")
+    ] = 120.0,
+    storage: Storage = "",
+) -> None:
+    """Make trials until the study stops (see `study stop`); start as many workers as wanted."""
+    from surehold.cli.compilation import announced
+    from surehold.cli.terminal import terminal
+    from surehold.studies.trial_function import problem_of, trial_function
+    from surehold.studies.worker import work as work_on
+
+    study = opened(name, storage)
+    console = terminal()
+
+    def ended(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, ended)
+    with announced(console):
+        attempt = trial_function(problem_of(study.settings, function), study.settings.space)
+        count = 0
+
+        def show(asked: Any, outcome: Any) -> None:
+            nonlocal count
+            count += 1
+            said = f"failed: {outcome.failure}" if outcome.failure else f"{outcome.value:.6g}"
+            console.print(f"trial {asked.id}{' (again)' * asked.again}: {said}", markup=False, soft_wrap=True)
+
+        try:
+            work_on(study, attempt, lifetime=lifetime, most=trials, after=show)
+        except KeyboardInterrupt:
+            console.print(f"Ended after {count} trials; the one under way is let go.", markup=False)
+            raise typer.Exit(130) from None
+    console.print(f"Done: {count} trials by this worker.", markup=False)

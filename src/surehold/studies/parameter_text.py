@@ -1,0 +1,84 @@
+"""Parameters as a person types them: `dx=-0.05:0.05, force=0.1:100:log, fingers=2:5:int, grip=pinch|power`."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
+
+from surehold.errors import InputError
+from surehold.studies.search_space import SearchSpace
+
+__all__ = ["parse_assignments", "parse_search_space"]
+
+_FORM = "write NAME=LOWER:UPPER, with :log, :int or :step=0.5 behind it where wanted, or NAME=THIS|THAT"
+
+
+def parse_search_space(text: str) -> SearchSpace:
+    """Return the search space that a text describes.
+
+    Raises
+    ------
+    InputError
+        If the text does not follow the form, repeats a name, or holds bounds that are none.
+
+    Examples
+    --------
+    >>> space = parse_search_space("dx=-0.05:0.05, force=0.1:100:log, fingers=2:5:int, grip=pinch|power")
+    >>> space.distributions["fingers"]
+    IntDistribution(high=5, log=False, low=2, step=1)
+    """
+    parameters: dict[str, BaseDistribution] = {}
+    for part in text.split(","):
+        name, equals, described = (piece.strip() for piece in part.partition("="))
+        if not equals or not name or not described:
+            raise InputError(f"parameter {part.strip()!r} is not understood; {_FORM}.")
+        if name in parameters:
+            raise InputError(f"parameter {name!r} is named twice; give each once.")
+        try:
+            parameters[name] = _distribution(name, described)
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"parameter {part.strip()!r} is not understood ({error}); {_FORM}.") from None
+    return SearchSpace(parameters)
+
+
+def parse_assignments(text: str, what: str) -> dict[str, str]:
+    """Return `{name: value}` from a text of the form NAME=VALUE,NAME=VALUE; `what` says in messages what it is."""
+    found: dict[str, str] = {}
+    for part in text.split(","):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals or not name or not value:
+            raise InputError(f"{what} {text!r} is not of the form NAME=VALUE,NAME=VALUE.")
+        if name in found:
+            raise InputError(f"{what} names {name!r} twice; give each once.")
+        found[name] = value
+    return found
+
+
+def _distribution(name: str, described: str) -> BaseDistribution:
+    if "|" in described:
+        return CategoricalDistribution([choice.strip() for choice in described.split("|")])
+    lower, *rest = described.split(":")
+    if not rest:
+        raise ValueError("one number is no range")
+    options: Mapping[str, Any] = dict(_option(option.strip()) for option in rest[1:])
+    whole, log = bool(options.get("int")), bool(options.get("log"))
+    number = int if whole else float
+    low, high, step = number(lower), number(rest[0]), options.get("step")
+    if not low < high:
+        raise InputError(
+            f"bounds of '{name}' are ({low}, {high}); lower must be smaller than upper: swap or widen them."
+        )
+    if whole:
+        return IntDistribution(int(low), int(high), log=log, step=1 if step is None else int(step))
+    return FloatDistribution(low, high, log=log, step=None if step is None else float(step))
+
+
+def _option(text: str) -> tuple[str, Any]:
+    name, _, value = text.partition("=")
+    if name in ("int", "log") and not value:
+        return name, True
+    if name == "step" and value:
+        return name, value
+    raise ValueError(f"{text!r} is none of log, int, step=...")

@@ -1,0 +1,46 @@
+"""A stored study as the result of a run, as reports want it: what would have been recommended after each trial."""
+
+from typing import Final
+
+import numpy as np
+
+from surehold.errors import InputError
+from surehold.optimization.maximization import Result, Trial
+from surehold.optimization.recommendation import Recommendation
+from surehold.studies.history import history_of
+from surehold.studies.ledger import NOTE, VETOED
+from surehold.studies.robot import RobotStudy
+
+__all__ = ["result_of"]
+
+_REPLAYED: Final = 60  # recommendations that are computed again
+
+
+def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
+    """Return the told trials of a study as a `Result`; recommendations at up to 60 of them, evenly spread.
+
+    Raises
+    ------
+    InputError
+        If no trial has given a value yet.
+    """
+    stored = {trial.number: trial for trial in study.trials()}
+    history = history_of(stored.values(), study.settings.space, True)
+    n = len(history.y)
+    if not np.isfinite(history.y).any():
+        raise InputError(f"study '{study.name}' has no trial with a value yet; there is nothing to show.")
+    first = max(study.n_initial, int(np.argmax(np.isfinite(history.y))) + 1)
+    replayed = set(np.unique(np.linspace(min(first, n), n, _REPLAYED).round().astype(int)).tolist())
+    optimizer = study.sampler.optimizer(study.study)
+    recommendations: dict[int, Recommendation] = {}
+    for count in sorted(replayed):
+        optimizer.restore(history.X[:count], history.y[:count], reached=history.reached[:count])
+        recommendations[count] = optimizer.recommend()
+    best = np.fmax.accumulate(history.y)
+    trials = []
+    for i in range(n):
+        attributes = stored[int(history.numbers[i])].user_attrs
+        failure = "" if np.isfinite(history.y[i]) else attributes.get(VETOED) or attributes.get(NOTE) or "failed"
+        x, y = history.X[i], float(history.y[i])
+        trials.append(Trial(i, x, y, failure, float(best[i]), recommendations.get(i + 1), 0.0))
+    return Result(optimizer, tuple(trials), recommendations[n], interrupted)

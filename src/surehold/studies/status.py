@@ -1,0 +1,110 @@
+"""A study at a glance, and its trials as rows."""
+
+import csv
+import io
+import json
+import time
+from typing import Any
+
+from optuna.trial import FrozenTrial, TrialState
+
+from surehold.studies.history import REACHED, parameters_of
+from surehold.studies.ledger import NOTE, VETOED, holder_of
+from surehold.studies.robot import RobotStudy
+
+__all__ = ["rows", "status", "to_csv", "to_json"]
+
+_STATES = {
+    TrialState.COMPLETE: "complete",
+    TrialState.FAIL: "failed",
+    TrialState.PRUNED: "pruned",
+    TrialState.RUNNING: "running",
+    TrialState.WAITING: "waiting",
+}
+
+
+def status(study: RobotStudy) -> dict[str, Any]:
+    """Return the state of a study as plain data."""
+    trials = study.trials()
+    now = time.time()
+    paused, stopped = study.paused, study.stopped()
+    values = [t.values[0] for t in trials if t.state == TrialState.COMPLETE and t.values]
+    best = max(values, default=None)
+    return {
+        "name": study.name,
+        "storage": study.storage.shown,
+        "state": "paused" if paused is not None else "stopped" if stopped else "open",
+        "reason": stopped if paused is None else paused,
+        "trials": len(trials),
+        **{name: sum(t.state == state for t in trials) for state, name in _STATES.items()},
+        "highest_value": best,
+        "highest_trial": next((t.number for t in trials if t.values and t.values[0] == best), None),
+        "parameters": study.settings.to_json()["parameters"],
+        "units": dict(study.settings.units),
+        "input_noise": study.settings.to_json()["input_noise"],
+        "stop_rule": {key: value for key, value in study.stop_rule.as_dict().items() if value is not None},
+        "pending": [_pending(t, now) for t in trials if not t.state.is_finished()],
+    }
+
+
+def rows(study: RobotStudy) -> list[dict[str, Any]]:
+    """Return one row a trial: id, state, value, parameters, what was reached, times, note."""
+    found = []
+    for trial in study.trials():
+        parameters, reached = parameters_of(trial), trial.user_attrs.get(REACHED, {})
+        names = study.settings.space.distributions
+        holder = holder_of(trial)
+        found.append(
+            {
+                "id": trial.number,
+                "state": _state(trial),
+                "value": trial.values[0] if trial.state == TrialState.COMPLETE and trial.values else None,
+                **{name: parameters.get(name) for name in names},
+                **{f"reached_{name}": reached.get(name) for name in names},
+                "begun": trial.datetime_start.isoformat() if trial.datetime_start else None,
+                "finished": trial.datetime_complete.isoformat() if trial.datetime_complete else None,
+                "worker": holder.name if holder is not None else None,
+                "note": trial.user_attrs.get(VETOED) or trial.user_attrs.get(NOTE),
+            }
+        )
+    return found
+
+
+def to_csv(study: RobotStudy) -> str:
+    """Return the trials as CSV with a header; an empty field is nothing."""
+    names = list(study.settings.space.distributions)
+    columns = ["id", "state", "value", *names, *(f"reached_{n}" for n in names), "begun", "finished", "worker", "note"]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows(study))
+    return text.getvalue()
+
+
+def to_json(study: RobotStudy) -> str:
+    """Return settings, trials and the recommendation last written as JSON."""
+    data = {
+        "name": study.name,
+        "settings": study.settings.to_json(),
+        "trials": rows(study),
+        "recommendation": study.study.user_attrs.get("surehold:recommendation"),
+    }
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def _state(trial: FrozenTrial) -> str:
+    return "vetoed" if VETOED in trial.user_attrs and trial.state == TrialState.FAIL else _STATES[trial.state]
+
+
+def _pending(trial: FrozenTrial, now: float) -> dict[str, Any]:
+    holder = holder_of(trial)
+    begun = trial.datetime_start
+    return {
+        "id": trial.number,
+        "state": _STATES[trial.state],
+        "parameters": parameters_of(trial),
+        "seconds": None if begun is None else max(now - begun.timestamp(), 0.0),
+        "worker": None if holder is None else holder.name or None,
+        "worker_alive": None if holder is None or holder.until is None else now <= holder.until,
+        "attempts": None if holder is None else holder.attempts,
+    }

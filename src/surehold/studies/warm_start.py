@@ -1,0 +1,139 @@
+"""Trials made before: from a CSV file or another study, with columns mapped and the checks of `tell`.
+
+All rows are checked before the first is stored.
+"""
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import optuna
+from optuna.study import Study
+from optuna.trial import TrialState
+
+from surehold.errors import InputError
+from surehold.studies.history import REACHED
+from surehold.studies.ledger import checked_value
+from surehold.studies.robot import RobotStudy
+from surehold.studies.storage import open_storage
+
+__all__ = ["FormerTrial", "former_study", "import_trials", "trials_of_csv", "trials_of_study"]
+
+_FAILED = {"fail", "failed", "vetoed", "pruned"}
+_UNFINISHED = {"running", "waiting"}
+
+
+class FormerTrial(NamedTuple):
+    """A trial as it was found."""
+
+    where: str
+    """for messages and the trial's note, such as "rig.csv, line 3" """
+    parameters: Mapping[str, Any]
+    value: Any
+    failed: bool
+    reached: Mapping[str, Any]
+    """the parameters that were truly reached, where they are known"""
+
+
+def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> list[FormerTrial]:
+    """Return the trials of a CSV file with a header.
+
+    Parameters
+    ----------
+    names
+        Column of each parameter, {parameter: column}.
+    value
+        Column of the value; where it is empty, or a column "state" says so, the trial failed. Rows whose state is
+        running or waiting are left out. Columns reached_NAME hold what was truly reached.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or a column is missing.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"file {path!r} cannot be read: {getattr(error, 'strerror', None) or error}.") from None
+    reader = csv.DictReader(text.splitlines())
+    columns = list(reader.fieldnames or [])
+    for column in (*names.values(), value):
+        if column not in columns:
+            raise InputError(f"file {path!r} has no column {column!r}; it has {', '.join(columns) or 'none'}.")
+    found = []
+    for row in reader:
+        state = (row.get("state") or "").strip().lower()
+        if state in _UNFINISHED:
+            continue
+        told = (row[value] or "").strip()
+        reached = {name: row[f"reached_{name}"] for name in names if (row.get(f"reached_{name}") or "").strip()}
+        parameters = {name: (row[column] or "").strip() for name, column in names.items()}
+        failed = state in _FAILED or not told
+        where = f"{Path(path).name}, line {reader.line_num}"
+        found.append(FormerTrial(where, parameters, None if failed else told, failed, reached))
+    return found
+
+
+def trials_of_study(study: Study, names: Mapping[str, str]) -> list[FormerTrial]:
+    """Return the finished trials of a study of Optuna; `names` are {parameter: its name there}.
+
+    Values of a study that minimizes change their sign. Trials that lack a parameter are refused by `import_trials`.
+    """
+    if len(study.directions) != 1:
+        raise InputError(f"study '{study.study_name}' has {len(study.directions)} objectives; one is needed.")
+    sign = 1.0 if study.direction.name == "MAXIMIZE" else -1.0
+    found = []
+    for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.FAIL)):
+        failed = trial.state == TrialState.FAIL
+        stored = trial.user_attrs.get(REACHED, {})
+        parameters = {name: trial.params[there] for name, there in names.items() if there in trial.params}
+        reached = {name: stored[there] for name, there in names.items() if there in stored}
+        value = None if failed or not trial.values else sign * trial.values[0]
+        found.append(FormerTrial(f"{study.study_name}, trial {trial.number}", parameters, value, failed, reached))
+    return found
+
+
+def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: bool = False) -> list[str]:
+    """Store former trials in a study, and return why some were left out.
+
+    Parameters
+    ----------
+    skip_bad
+        Whether trials that do not fit are left out; otherwise nothing is stored where one does not fit.
+
+    Raises
+    ------
+    InputError
+        If a trial does not fit: a parameter is missing or outside its range, or the value is not finite.
+    """
+    good, left_out = [], []
+    for trial in trials:
+        try:
+            checked_value(trial.value, trial.failed)
+            commanded = study.settings.space.check(trial.parameters)
+            study.settings.space.check(commanded | dict(trial.reached), "reached")
+            good.append(trial)
+        except InputError as error:
+            if not skip_bad:
+                raise InputError(f"{trial.where}: {error} Nothing was imported.") from None
+            left_out.append(f"{trial.where}: {error}")
+    for trial in good:
+        study.add(
+            trial.parameters,
+            trial.value,
+            failed=trial.failed,
+            reached=trial.reached or None,
+            note=f"from {trial.where}",
+        )
+    return left_out
+
+
+def former_study(name: str, storage: str) -> Study:
+    """Return any single study of Optuna, surehold's or not, to read from; raises InputError where it is not there."""
+    opened = open_storage(storage, name, create=False)
+    with opened.failures():
+        names = optuna.get_all_study_names(opened.backend)
+        if name not in names:
+            raise InputError(f"study '{name}' is not in {opened.shown}; there are {', '.join(names) or 'none'}.")
+        return optuna.load_study(study_name=name, storage=opened.backend)

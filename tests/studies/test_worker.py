@@ -1,0 +1,153 @@
+import importlib.util
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from optuna.trial import TrialState
+
+import surehold as sh
+from surehold.errors import InputError
+from surehold.studies.robot import RobotStudy
+from surehold.studies.search_space import SearchSpace
+from surehold.studies.settings import StudySettings
+from surehold.studies.stop_rule import StopRule
+from surehold.studies.storage import StorageFailure
+from surehold.studies.trial_function import problem_of, trial_function
+from surehold.studies.worker import work
+
+SPACE = SearchSpace({"x": (0.0, 1.0)})
+
+
+@pytest.fixture
+def study(tmp_path):
+    study = RobotStudy.create("rig", StudySettings(SPACE, optimizer={"n_initial": 4}), str(tmp_path / "journal.log"))
+    study.set_stop_rule(StopRule(trials=8))
+    return study
+
+
+def attempt(f):
+    return trial_function(f, SPACE)
+
+
+def test_killed_workers_lose_nothing(url):
+    """The experiment of benchmarks/study_survival.py, shortened."""
+    path = Path(__file__).parents[2] / "benchmarks" / "study_survival.py"
+    spec = importlib.util.spec_from_file_location("study_survival", path)
+    survival = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(survival)
+    found = survival.survive(url, workers=2, trials=12, every=1.0, seconds=0.3, lifetime=2.0, most=3)
+    assert (found["trials"], found["complete"], found["failed"], found["left_running"]) == (12, 12, 0, 0), found
+    assert found["parameters_twice"] == 0
+    assert found["answers_not_stored"] <= found["kills"]
+    assert found["recommendation_agrees"]
+    assert found["kills"] > 0
+
+
+def test_failures_are_told_and_do_not_end_the_worker(study):
+    def f(x):
+        if x[0] > 0.5:
+            raise RuntimeError("slipped")
+        return np.nan if x[0] > 0.4 else x[0]
+
+    seen = []
+    assert work(study, attempt(f), after=lambda asked, outcome: seen.append(outcome)) == 8
+    states = [t.state for t in study.trials()]
+    assert states.count(TrialState.FAIL) == sum(bool(o.failure) for o in seen) > 0
+    assert "RuntimeError: slipped" in {o.failure for o in seen}
+    assert work(study, attempt(f)) == 0
+
+
+def test_a_worker_makes_no_more_than_it_may(study):
+    assert work(study, attempt(lambda x: x[0]), most=3) == 3
+    assert len(study.trials()) == 3
+
+
+def test_interrupting_lets_the_trial_go(study):
+    def interrupted(x):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work(study, attempt(interrupted))
+    time.sleep(0.01)
+    assert study.ask("other", lifetime=60.0).id == 0
+
+
+def test_a_slow_trial_is_kept_by_signs_of_life(study):
+    others = []
+
+    def slow(x):
+        time.sleep(1.2)
+        others.append(study.ask("other").id)
+        return x[0]
+
+    work(study, attempt(slow), lifetime=0.8, most=1)
+    assert others == [1]
+    assert study.trials()[0].state == TrialState.COMPLETE
+
+
+def test_an_answer_outlives_a_storage_that_is_away(study, monkeypatch):
+    monkeypatch.setattr("surehold.studies.worker._PATIENCE", (0.0, 0.0, 0.0))
+    tell, failures = study.tell, [StorageFailure("busy"), StorageFailure("busy")]
+
+    def troubled(*arguments, **named):
+        if failures:
+            raise failures.pop()
+        return tell(*arguments, **named)
+
+    monkeypatch.setattr(study, "tell", troubled)
+    assert work(study, attempt(lambda x: x[0]), most=2) == 2
+    assert [t.state for t in study.trials()] == [TrialState.COMPLETE] * 2
+    failures += [StorageFailure("gone")] * 9
+    with pytest.raises(StorageFailure, match=r"trial 2 \(value 0\.\d+\) could not be stored: gone"):
+        work(study, attempt(lambda x: x[0]), most=1)
+
+
+def test_a_late_answer_of_another_value_is_refused_and_the_worker_goes_on(study, caplog):
+    def overtaken(x):
+        study.tell(study.trials()[-1].number, -1.0)
+        return x[0]
+
+    assert work(study, attempt(overtaken), most=2) == 2
+    assert [t.value for t in study.trials()] == [-1.0, -1.0]
+
+
+def test_workers_wait_while_the_study_is_paused(study):
+    study.pause("lunch")
+    thread = threading.Thread(target=work, args=(study, attempt(lambda x: x[0])), kwargs={"most": 1})
+    thread.start()
+    time.sleep(0.3)
+    assert study.trials() == []
+    study.resume()
+    thread.join(timeout=20.0)
+    assert len(study.trials()) == 1
+
+
+def test_parameters_reach_the_function_as_numbers_or_by_name():
+    space = SearchSpace({"a": (0.0, 1.0), "b": (0.0, 2.0)})
+    assert trial_function(lambda x: float(x @ [1.0, 10.0]), space)({"b": 2.0, "a": 1.0}).value == 21.0
+    from optuna.distributions import CategoricalDistribution, IntDistribution
+
+    mixed = SearchSpace({"n": IntDistribution(1, 3), "c": CategoricalDistribution(["p", "q"])})
+    outcome = trial_function(lambda p: p["n"] * (10 if p["c"] == "q" else 1), mixed)({"n": 3, "c": "q"})
+    assert outcome == (30.0, "")
+
+
+def test_the_problem_of_a_study_is_found_again(tmp_path):
+    grasp = {"object": "mug", "facet": "right-front", "variables": ["dx", "dy"], "contact": "graded"}
+    problem = problem_of(StudySettings(SPACE, problem={"grasp": grasp}))
+    assert problem.box.names == ("dx", "dy")
+    assert problem_of(StudySettings(SPACE, problem={"synthetic": "rkhs"})).box == sh.problems.RKHS().box
+    (tmp_path / "own.py").write_text("def f(x):\n    return 7.0\n")
+    assert problem_of(StudySettings(SPACE), f"{tmp_path}/own.py:f")(0) == 7.0
+    assert problem_of(StudySettings(SPACE, problem={"function": f"{tmp_path}/own.py:f"}))(0) == 7.0
+    with pytest.raises(InputError, match="says nothing about what its trials are"):
+        problem_of(StudySettings(SPACE))
+
+
+def test_a_lifetime_must_be_positive(study):
+    with pytest.raises(InputError, match="lifetime"):
+        work(study, attempt(lambda x: x[0]), lifetime=0.0)
+    assert sys.modules["surehold.studies.worker"].LIFETIME > 0.0
