@@ -140,7 +140,7 @@ def _unscented_posterior() -> Picture:
 def _metric() -> Picture:
     from surehold.problems.grasp import Grasp
 
-    unit = np.linspace(0.5, 0.65, 241)
+    unit = np.linspace(0.1, 0.25, 241)
     lines = []
     for contact, label, color in (("single", "one contact a link (thesis)", _INK), ("graded", "soft touch", _BLUE)):
         problem = Grasp("bottle", variables=("dx",), contact=contact)

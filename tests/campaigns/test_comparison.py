@@ -1,0 +1,163 @@
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from surehold.campaigns.comparison import claim_results, comparisons, final_values, rows_of, traces
+from surehold.campaigns.published import ORIGINAL_SECONDS, published, published_tables
+from surehold.campaigns.sections import (
+    campaign_section,
+    claims_table,
+    cost_table,
+    curves,
+    open_places_table,
+    plus_minus_remark,
+)
+from surehold.campaigns.table import Records
+from surehold.campaigns.thesis import CLAIMS, OPEN_PLACES
+
+
+def records_of(plan, runs, results, measure="best", **more):
+    """Records as the tables give them: `results` {(problem, method): final values by seed}."""
+    cells = [{"problem": p, "method": m, "input_noise": None, "initial": 2, "trials": 4} for p, m in results]
+    records = Records({"plan": plan, "title": plan, "note": "", "runs": runs, "cells": cells, "format": "x"})
+    for (p, m), values in results.items():
+        for seed, value in enumerate(values):
+            row = {"problem": p, "method": m, "seed": seed, "status": "done", "trials": 4, "cpu_seconds": 2.0}
+            row |= {measure: [[0, value - 1.0], [2, value]], "versions": {"source": "a"}, **more}
+            records.rows[p, m, seed] = row
+    return records
+
+
+def drawn(mean, std, n, seed=0):
+    x = np.random.default_rng(seed).standard_normal(n)
+    return (mean + std * (x - x.mean()) / x.std(ddof=1)).tolist()
+
+
+def test_published_numbers_are_the_printed_ones():
+    gp = published("4.1", "RKHS", "GP", "best")
+    assert gp is not None
+    assert (gp.mean, gp.pm, gp.runs, gp.unit) == (5.3279, 0.0642, 100, 1e-4)
+    assert gp.std == pytest.approx(6.02 * 0.0642, rel=1e-3)
+    worst = published("4.4", "glass", "UBO", "worst")
+    assert worst is not None
+    assert (worst.mean, worst.pm, worst.std, worst.runs) == (0.252, None, None, 30)
+    drill = published("4.2", "drill side", "TGP-winf", "best")
+    assert drill is not None
+    assert (drill.mean, drill.pm) == (0.1239, 0.0096)
+    assert published("4.3", "noise 0.2", "TGP-w3", "best").mean == 5.3287
+    assert published("4.1", "RKHS", "TGP-w4", "best") is None
+    assert published_tables() == ["4.1", "4.2", "4.3", "4.4"]
+    assert ORIGINAL_SECONDS["GM", "TGP-w1"] == 230.0
+
+
+def test_final_values_and_traces():
+    records = records_of("mine", 3, {("a", "m"): [1.0, 2.0, 3.0]})
+    assert final_values(records, "a", "m", "best") == {0: 1.0, 1: 2.0, 2: 3.0}
+    assert traces(records, "a", "m", "best").tolist() == [[v - 1, v - 1, v, v] for v in (1.0, 2.0, 3.0)]
+    records.rows["a", "m", 1]["status"] = "failed"
+    assert final_values(records, "a", "m", "best") == {0: 1.0, 2: 3.0}
+
+
+@pytest.mark.parametrize(
+    ("mean", "verdict"), [(5.3279, "agrees"), (5.40, "agrees"), (5.7, "better"), (5.0, "differs"), (5.32794, "agrees")]
+)
+def test_verdicts_beside_the_published_number(mean, verdict):
+    records = records_of("table-4.1", 100, {("RKHS", "GP"): drawn(mean, 0.386, 100)})
+    (row,) = rows_of(records)
+    assert row.verdict == verdict
+    assert row.ours.n == row.planned == 100
+    expected = stats.ttest_ind_from_stats(mean, 0.386, 100, 5.3279, row.theirs.std, 100, equal_var=False).pvalue
+    assert row.p == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_low_standard_deviation_is_better():
+    values = drawn(0.3, 0.1, 100)
+    records = records_of("table-4.4", 100, {("RKHS", "BO"): values}, "std", mean=[[0, 4.0]], worst=[[0, 1.0]])
+    row = next(row for row in rows_of(records) if row.measure == "std")
+    assert row.verdict == "better"  # 0.3 against the published 0.554
+    higher = records_of("table-4.4", 100, {("RKHS", "BO"): drawn(0.9, 0.1, 100)}, "std")
+    assert next(row for row in rows_of(higher) if row.measure == "std").verdict == "differs"
+
+
+def test_rows_without_runs_say_so():
+    records = records_of("table-4.1", 100, {("RKHS", "GP"): [], ("GM", "GP"): [0.12]})
+    first, second = rows_of(records)
+    assert first.ours is None
+    assert first.verdict == ""
+    assert math.isnan(second.p)
+    text = campaign_section(records).tables[0].rows
+    assert text[0][2] == "0 of 100"
+    assert text[0][-1] == "no runs"
+
+
+def test_p_values_are_adjusted_within_the_table():
+    results = {("RKHS", m): drawn(5.4, 0.4, 100, i) for i, m in enumerate(("GP", "TGP-w1", "TGP-w2"))}
+    alone = [rows_of(records_of("table-4.1", 100, {key: values}))[0].p for key, values in results.items()]
+    together = [row.p for row in rows_of(records_of("table-4.1", 100, results))]
+    assert min(together) == pytest.approx(min(1.0, 3 * min(alone)))
+
+
+def test_methods_are_compared_on_common_seeds():
+    base = drawn(1.0, 0.3, 30)
+    better = [v + 0.05 for v in base]
+    records = records_of("mine", 30, {("a", "first"): base, ("a", "second"): better[:20]})
+    (told,) = comparisons(records)
+    assert told.difference.n == 20
+    assert told.difference.mean == pytest.approx(0.05)
+    assert told.verdict == "better"
+    (told,) = comparisons(records_of("mine", 30, {("a", "first"): better, ("a", "second"): base}))
+    assert told.verdict == "worse"
+    (told,) = comparisons(records_of("mine", 30, {("a", "first"): base, ("a", "second"): drawn(1.0, 0.3, 30, 9)}))
+    assert told.verdict == "no difference shown"
+
+
+@pytest.mark.parametrize(
+    ("shift", "rkhs", "gf"),
+    [(0.2, "holds", "contradicted"), (0.0, "not shown", "holds"), (-0.2, "contradicted", "holds")],
+)
+def test_claims(shift, rkhs, gf):
+    base = drawn(5.0, 0.3, 100)
+    noise = drawn(0.0, 0.05, 100, 4)
+    other = [b + shift + e for b, e in zip(base, noise, strict=True)]
+    results = {(p, m): other if m == "TGP-winf" else base for p in ("RKHS", "GF") for m in ("GP", "TGP-winf")}
+    told = claim_results({"table-4.1": records_of("table-4.1", 100, results)})
+    assert len(told) == 2 * len(CLAIMS)
+    verdicts = {(t.claim.problem, t.plan): t.verdict for t in told if t.claim.better == "TGP-winf"}
+    assert verdicts["RKHS", "table-4.1"] == rkhs
+    assert verdicts["GF", "table-4.1"] == gf
+    assert verdicts["GM", "table-4.1"] == "no runs"
+    assert verdicts["RKHS", "table-4.1-defaults"] == "no runs"
+
+
+def test_curves_are_means_with_bands_and_the_first_split():
+    results = {("RKHS", "GP"): drawn(5.0, 0.5, 25), ("RKHS", "TGP-winf"): drawn(5.5, 0.5, 25)}
+    records = records_of("table-4.1", 100, results)
+    for (_, method, seed), row in records.rows.items():
+        if method == "TGP-winf":
+            row["first_split"] = 3 + seed % 2
+    (picture,) = curves(records)
+    (panel,) = picture.panels  # the problems without runs are left out
+    line, band = panel.lines[0], panel.bands[0]
+    assert line.y == pytest.approx([4.0, 4.0, 5.0, 5.0])
+    assert band.high - line.y == pytest.approx(np.full(4, 1.66 * 0.5 / 5.0))
+    assert panel.verticals == ((3.0, "first split"),)
+    assert panel.initial == 2.0
+
+
+def test_costs_stand_beside_the_originals():
+    table = cost_table({"table-4.1": records_of("table-4.1", 100, {("GM", "GP"): drawn(0.1, 0.01, 10)})})
+    assert table.rows == (("GM", "GP", "thesis", "2.00", "101", "50", "0.056", "2.8"),)
+
+
+def test_the_printed_plus_minus_is_remarked_upon():
+    records = records_of("table-4.1", 100, {("RKHS", "GP"): drawn(5.3, 6.0 * 0.0642, 100)})
+    assert "6.02 times" in plus_minus_remark({})
+    assert "6.0 times the printed ± (median of 1 rows)" in plus_minus_remark({"table-4.1": records})
+
+
+def test_claims_and_open_places_fill_their_tables():
+    records = {"table-4.1": records_of("table-4.1", 100, {("RKHS", "GP"): [1.0]})}
+    assert len(claims_table(records).rows) == sum(claim.plan == "table-4.1" for claim in CLAIMS)
+    assert len(open_places_table().rows) == len(OPEN_PLACES) > 10

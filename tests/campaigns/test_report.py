@@ -1,0 +1,118 @@
+import csv
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from surehold.campaigns.illustrations import grasp_scenes, illustrations
+from surehold.campaigns.plan_file import load_plan
+from surehold.campaigns.report import campaign_report, read_campaigns, write_report
+from surehold.campaigns.runner import run_campaign
+from surehold.errors import InputError
+from surehold.problems.synthetic import GF, GM, RKHS
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory, cheap):
+    """The thesis' plans with few trials, and one that is no plan of the thesis."""
+    root = tmp_path_factory.mktemp("campaigns")
+
+    def few(name):
+        plan = load_plan(name)
+        problems = {label: replace(on, trials=on.initial + 2) for label, on in plan.problems.items()}
+        return replace(plan, problems=problems)
+
+    run_campaign(few("table-4.1-defaults"), root / "table-4.1-defaults", runs=3, only=["RKHS", "GF"])
+    run_campaign(few("table-4.4-defaults"), root / "table-4.4-defaults", runs=2, only=["RKHS"])
+    run_campaign(few("table-4.4-grasps"), root / "table-4.4-grasps", runs=1, only=["bottle"])
+    run_campaign(cheap, root / "cheap", runs=2)
+    return sorted(path for path in root.iterdir())
+
+
+def test_the_whole_report(tmp_path, folders):
+    page = write_report(folders, tmp_path)
+    text = page.read_text(encoding="utf-8")
+    assert not re.search(r'(?:src|href)="https?:', text), "the page loads something from the network"
+    for word in ("5.3279 ± 0.0642", "no runs", "unfinished", "1.66 standard errors", "A cheap plan"):
+        assert word in text, word
+    for number in ("3.1", "3.3", "3.4", "4.1", "4.4", "4.5", "4.7", "4.9", "4.10", "4.12"):
+        assert f"Figure {number}" in text, number
+    assert text.count("Figure 4.16: ") >= 4  # safe and unsafe answers, each with its worst re-query
+    with open(tmp_path / "tables" / "table-4.1-defaults.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 15
+    assert rows[0]["published"] == "5.3279 ± 0.0642"
+    assert rows[0]["runs"] == "3 of 100"
+    assert (tmp_path / "figures" / "table-4.1-defaults-figure-4.5.svg").stat().st_size > 5000
+    assert (tmp_path / "figures" / "figure-4.4.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_page_opens_in_a_browser(tmp_path, folders):
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None:
+        pytest.skip("no chromium here")
+    page = write_report(folders, tmp_path)
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", "--virtual-time-budget=8000"]
+    told = subprocess.run([*command, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
+    assert 'data-view="0"' in told.stdout
+    assert told.stdout.count("<svg") >= 10
+    assert "<canvas" in told.stdout or "shows no 3-D graphics" in told.stdout
+
+
+def test_reports_are_repeatable(folders):
+    assert str(campaign_report(read_campaigns(folders), illustrated=False)) == str(
+        campaign_report(read_campaigns(folders), illustrated=False)
+    )
+
+
+def test_the_same_plan_twice_is_refused(folders):
+    with pytest.raises(InputError, match="two folders"):
+        read_campaigns([folders[0], folders[0]])
+
+
+def test_illustrations_show_what_they_say():
+    pictures = {picture.name: picture for picture in illustrations()}
+    assert list(pictures) == [f"figure-{n}" for n in ("3.1", "3.3", "3.4", "4.1", "4.4", "4.7", "4.9")]
+    kernel = pictures["figure-3.1"].panels[0].lines[1]
+    r = np.sqrt(5.0) * kernel.x
+    assert kernel.y == pytest.approx((1.0 + r + r**2 / 3.0) * np.exp(-r))
+    rkhs = pictures["figure-3.4"].panels[0].lines[0]
+    assert rkhs.y == pytest.approx(RKHS()(rkhs.x[:, None]))
+    gm, gf = (panel.z for panel in pictures["figure-4.1"].panels[1:])
+    assert gm[40, 49] == pytest.approx(GM()([0.40, 0.49]))
+    assert gf[34, 25] == pytest.approx(GF()([0.34, 0.25]))
+
+
+def test_the_unscented_example_is_the_lognormal():
+    """Figure 3.3 sends N(0.35, 0.2^2) through exp(3 x), whose mean and deviation are known."""
+    caption = next(p.caption for p in illustrations() if p.name == "figure-3.3")
+    mean = np.exp(3.0 * 0.35 + 0.5 * 0.6**2)
+    std = mean * np.sqrt(np.exp(0.6**2) - 1.0)
+    numbers = [float(n) for n in re.findall(r"\d+\.\d+", caption)]
+    assert numbers[0] == pytest.approx(mean, abs=2e-3)
+    assert numbers[1] == pytest.approx(std, abs=2e-2)
+    assert abs(numbers[2] - mean) < 0.2 * abs(numbers[4] - mean), "the unscented mean is no better than the linear one"
+
+
+def test_the_tree_sees_what_the_process_does_not():
+    """Figure 4.4: between samples of the smooth half the treed process is much surer than the plain one."""
+    plain, treed = next(p for p in illustrations() if p.name == "figure-4.4").panels
+
+    def width(panel):
+        smooth = panel.bands[0].x < 0.6
+        return float(np.mean((panel.bands[0].high - panel.bands[0].low)[smooth]))
+
+    assert width(treed) < 0.3 * width(plain)
+    assert treed.verticals
+    assert not plain.verticals
+
+
+def test_the_hand_is_open_in_the_scenes_of_the_default_pose():
+    scenes = grasp_scenes()
+    assert [label.rpartition(" ")[2] for label in scenes] == ["bottle", "mug", "glass", "drill"]
+    for scene in scenes.values():
+        assert scene.box is not None
+        assert len(scene.contacts.points) == 0
