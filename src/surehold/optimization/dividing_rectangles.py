@@ -25,12 +25,21 @@ _LOWEST: Final = -1e300  # stands for values that are not finite
 
 
 @njit(cache=True)
+def _least(levels):
+    least = levels[0]
+    for k in range(1, levels.size):
+        least = min(least, levels[k])
+    return least
+
+
+@njit(cache=True)
 def _chosen(sizes, values, count, best_of, chosen):
     """Fill `chosen` with the rectangles to be divided, largest first; return their number.
 
     sizes (c,), the least level of each, and values (c,), of which the first `count` are in use; best_of is work space.
     """
-    best_of[:] = -1
+    for level in range(best_of.size):
+        best_of[level] = -1
     top = -np.inf
     for i in range(count):
         level = sizes[i]
@@ -84,7 +93,8 @@ def _propose(centers, levels, sizes, values, counts, budget, best_of, chosen, po
                 if levels[r, parent, k] == shortest:
                     step = 3.0 ** -(shortest + 1.0)
                     for sign in range(2):
-                        points[total] = centers[r, parent]
+                        for j in range(d):
+                            points[total, j] = centers[r, parent, j]
                         points[total, k] += step if sign else -step
                         owners[total, 0], owners[total, 1], owners[total, 2] = r, parent, k
                         total += 1
@@ -113,12 +123,13 @@ def _divide(centers, levels, sizes, values, counts, points, owners, found, total
             levels[r, parent, side] += 1
             for i in range(pair, pair + 2):
                 n = counts[r]
-                centers[r, n] = points[i]
-                levels[r, n] = levels[r, parent]
-                sizes[r, n] = levels[r, n].min()
+                for k in range(d):
+                    centers[r, n, k] = points[i, k]
+                    levels[r, n, k] = levels[r, parent, k]
+                sizes[r, n] = _least(levels[r, n])
                 values[r, n] = found[i]
                 counts[r] += 1
-        sizes[r, parent] = levels[r, parent].min()
+        sizes[r, parent] = _least(levels[r, parent])
         start = stop
 
 

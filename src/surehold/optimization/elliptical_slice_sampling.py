@@ -69,7 +69,8 @@ def _sample(density, evidence, center, root, burn_in, thin, states, log_densitie
             evaluations += 1
             if proposed + correction >= level or angle == 0.0:  # at 0 it is the present state, which lies in the slice
                 value, remainder, square = proposed, proposed + correction, length
-                z[:] = proposal
+                for i in range(p):
+                    z[i] = proposal[i]
                 break
             if angle < 0.0:
                 left = angle
@@ -78,7 +79,8 @@ def _sample(density, evidence, center, root, burn_in, thin, states, log_densitie
             angle = left + rng.random() * (right - left)
         kept = step - burn_in + 1
         if kept > 0 and kept % thin == 0:
-            states[kept // thin - 1] = theta
+            for i in range(p):
+                states[kept // thin - 1, i] = theta[i]
             log_densities[kept // thin - 1] = value
     return evaluations
 

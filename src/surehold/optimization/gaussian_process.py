@@ -27,7 +27,7 @@ __all__ = ["NOISES", "GaussianProcess", "NoiseName"]
 NoiseName = Literal["none", "inferred", "heteroscedastic"]
 NOISES: Final = get_args(NoiseName)
 _REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
-_SURPRISE: Final = 4.0  # standard deviations by which a trial may miss its prediction before all is learnt anew
+SURPRISE: Final = 4.0  # standard deviations by which a trial may miss its prediction before all is learnt anew
 _LOUDEST: Final = 1e100  # standard deviation of the noise, in those of the outputs; its square stays finite
 
 
@@ -136,9 +136,9 @@ class GaussianProcess:
             last = previous.hyperparameters.theta[-1] if isinstance(previous, GaussianProcessPosterior) else None
             return self.condition_on_blocks(X, y, rng, self.standardization(y), start=last, noise=noise)
         n, stream = len(y), int(rng.integers(2**63))
-        k = n - n % (1 << max(0, n.bit_length() - 5))
+        k = learnt_from(n)
         posterior = self._learnt_from(k, X, y, noise, stream)
-        if k < n and (posterior.outputs.flat or posterior.surprise(k) > _SURPRISE):
+        if k < n and (posterior.outputs.flat or posterior.surprise(k) > SURPRISE):
             posterior = self._learnt_from(n, X, y, noise, stream)
         return posterior
 
@@ -345,6 +345,11 @@ def _positive(name: str, value: float) -> float:
     if not (np.isfinite(value) and value > 0.0):
         raise InputError(f"{name} is {value!r}; give a positive finite number.")
     return float(value)
+
+
+def learnt_from(n: int) -> int:
+    """Return k: of n trials, the first k are those that hyperparameters are learnt from; n - n/16 < k <= n."""
+    return n - n % (1 << max(0, n.bit_length() - 5))
 
 
 def fingerprint(X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, *others) -> bytes:

@@ -98,21 +98,8 @@ class GaussianProcessPosterior:
         return Factors(inverse_L, alpha, repaired)
 
     def surprise(self, k: int) -> float:
-        """Return how much the trials after the first k contradict the particles, in standard deviations.
-
-        That is the largest miss of a trial, predicted from those before it, by the particle that misses least; or
-        infinity, where these trials are so much likelier under some particles that less than a quarter of all count
-        (effective sample size, Kong 1992).
-        """
-        z = np.einsum(
-            "mij,mj->mi", self._factors.inverse_L[:, k:], self._Y
-        )  # (m, n - k), standard normal if all is well
-        diagonal = np.diagonal(self._factors.inverse_L, axis1=1, axis2=2)[:, k:]
-        logs = (np.log(diagonal) - 0.5 * z * z).sum(axis=1)
-        weights = np.exp(logs - logs.max())
-        if weights.sum() ** 2 < 0.25 * len(weights) * np.square(weights).sum():
-            return float("inf")
-        return float(np.abs(z).min(axis=0).max())
+        """Return how much the trials after the first k contradict the particles, in standard deviations."""
+        return surprise(self._factors.inverse_L, self._Y, k)
 
     @property
     def length_scales(self) -> NDArray[np.float64]:
@@ -213,3 +200,18 @@ class GaussianProcessPosterior:
         if self.log_noise is not None:
             return np.exp(self.log_noise.moments(X).mean[0])
         return np.full(len(X), self.evidence.noise.mean())
+
+
+def surprise(inverse_L: NDArray[np.float64], Y: NDArray[np.float64], k: int) -> float:
+    """Return how much trials after the first k contradict particles that were learnt without them, in deviations.
+
+    That is the largest miss of a trial, predicted from those before it, by the particle that misses least; or infinity,
+    where these trials are so much likelier under some particles that less than a quarter of all count (effective sample
+    size, Kong 1992). inverse_L (m, n, n) are the inverse factors of the data's covariances, Y (m, n) the outputs.
+    """
+    z = np.einsum("mij,mj->mi", inverse_L[:, k:], Y)  # (m, n - k), standard normal if all is well
+    logs = (np.log(np.diagonal(inverse_L, axis1=1, axis2=2)[:, k:]) - 0.5 * z * z).sum(axis=1)
+    weights = np.exp(logs - logs.max())
+    if weights.sum() ** 2 < 0.25 * len(weights) * np.square(weights).sum():
+        return float("inf")
+    return float(np.abs(z).min(axis=0).max())

@@ -19,6 +19,7 @@ from surehold.optimization.quadratures import exact
 from surehold.optimization.risk import Risk, RiskImprovement, WorstCaseBound
 from surehold.optimization.robustness import Perturbations
 from surehold.optimization.surrogate import Posterior, mixture
+from surehold.optimization.trust_region import box_around, side_after
 
 __all__ = ["Goal"]
 
@@ -46,6 +47,10 @@ class Goal:
     """standard deviations of the confidence bounds"""
     noisy: bool
     """whether observations carry noise, so that the highest one is no incumbent"""
+    trust_region: bool
+    """whether the next trial is sought in a box around the best one, which grows and shrinks with success"""
+    n_initial: int
+    """trials of the initial design"""
     thesis: bool
     """whether candidates are sought and improvement is measured as in the thesis"""
 
@@ -107,20 +112,25 @@ class Goal:
         failed : (f, d)
             Inputs that gave no value.
         """
-        if not self.thesis and self._stalled(posterior, tried, observed, len(tried) + len(failed)):
+        if not (self.thesis or self.trust_region) and self._stalled(
+            posterior, tried, observed, len(tried) + len(failed)
+        ):
             return maximizer.largest_holes(np.concatenate([tried, failed, pending]), rng)
         best, anchors = self._incumbent(posterior, tried, observed)
         if len(pending):
             posterior = posterior.with_pending(pending)
             best = np.maximum(best, self._believed(posterior, pending))
         d = tried.shape[1]
+        regions = posterior.regions
+        if self.trust_region:
+            regions = regions.within(box_around(anchors[0], side_after(observed, self.n_initial, d)))
         if self.risk.name == "worst":
             bound = WorstCaseBound(posterior, self.accurate, self.kappa)
-            found = maximizer.multistart(bound, bound, d, anchors, rng, posterior.regions)
+            found = maximizer.multistart(bound, bound, d, anchors, rng, regions)
             return np.concatenate([bound.weakest(found[0]), found])
         if self.risk.name != "mean":
             improvement = RiskImprovement(posterior, self.accurate, self.risk, float(best), rng)
-            found = maximizer.multistart(improvement, improvement, d, anchors, rng, posterior.regions)
+            found = maximizer.multistart(improvement, improvement, d, anchors, rng, regions)
             return np.concatenate([self._looks(posterior, found[0]), found])
         if self.criterion.scale == "exact":
             margin = self.margin
@@ -132,9 +142,9 @@ class Goal:
             margin, reached = self.margin, (self.accurate, self.coarse)
         accurate = self._acquisition(posterior, reached[0], best, margin)
         if self.thesis:
-            return maximizer.direct(accurate, d, anchors[0], rng, posterior.regions)
+            return maximizer.direct(accurate, d, anchors[0], rng, regions)
         coarse = self._acquisition(posterior.thinned(_SCREENED), reached[1], float(np.mean(best)), margin)
-        found = maximizer.multistart(accurate, coarse, d, anchors, rng, posterior.regions)
+        found = maximizer.multistart(accurate, coarse, d, anchors, rng, regions)
         if self.criterion.scale == "robust":
             found = np.concatenate([self._looks(posterior, found[0]), found])
         return found

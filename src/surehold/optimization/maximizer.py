@@ -37,17 +37,18 @@ def multistart(
     anchors : (a, d)
         Promising points, such as the best trials so far: a narrow peak is found from its flank, hardly by chance.
     regions
-        Boxes in each of which candidates are laid, and which no ascent leaves; None is the cube.
+        Boxes in each of which candidates are laid, and which no ascent leaves; together they are a box, too. None is
+        the cube.
     """
     from scipy.stats import qmc
 
-    candidates = [qmc.Sobol(dimension, rng=rng).random(_CANDIDATES)]
+    regions = regions or Regions.whole(dimension)
+    lower, upper = regions.lower.min(axis=0), regions.upper.max(axis=0)
+    candidates = [lower + (upper - lower) * qmc.Sobol(dimension, rng=rng).random(_CANDIDATES)]
     for scale in _SCALES:
-        noise = scale * rng.standard_normal((_COPIES, *anchors.shape))
-        candidates.append(np.clip(anchors + noise, 0.0, 1.0).reshape(-1, dimension))
-    if regions is None or len(regions.lower) == 1:
-        regions = Regions.whole(dimension)
-    else:
+        noise = scale * (upper - lower) * rng.standard_normal((_COPIES, *anchors.shape))
+        candidates.append(np.clip(anchors + noise, lower, upper).reshape(-1, dimension))
+    if len(regions.lower) > 1:
         inside = qmc.Sobol(dimension, rng=rng).random(_IN_REGIONS)[: max(1, _IN_REGIONS // len(regions.lower))]
         width = regions.upper - regions.lower
         candidates.append((regions.lower[:, None] + inside * width[:, None]).reshape(-1, dimension))

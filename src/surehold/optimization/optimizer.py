@@ -19,6 +19,7 @@ from surehold.optimization.gaussian_process import GaussianProcess, NoiseName
 from surehold.optimization.goal import Goal
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.lattice import Lattice, LatticePosterior
+from surehold.optimization.local_global import LocalGlobalProcess
 from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
 from surehold.optimization.recommendation import Recommendation, recommendation
 from surehold.optimization.risk import Risk
@@ -29,7 +30,7 @@ from surehold.optimization.trials import Trials, same
 
 __all__ = ["Optimizer"]
 
-SURROGATES: Final = ("gp", "tgp")
+SURROGATES: Final = ("gp", "tgp", "local_global")
 
 
 class Optimizer:
@@ -45,8 +46,9 @@ class Optimizer:
     input_noise
         How far the reached input strays from the commanded one; None for inputs that are reached exactly.
     surrogate
-        "gp", "tgp" (a treed Gaussian process, for functions that are smooth here and rough there), or an object with
-        the method `condition` (see `surrogate.Surrogate`).
+        "gp" (default), "tgp" (a treed Gaussian process, for functions that are smooth here and rough there),
+        "local_global" (rough around a center that is learnt, smooth elsewhere; no observation noise), or an object
+        with the method `condition` (see `surrogate.Surrogate`).
     criterion
         "ei", "log_ei", "pi", "ucb"; with input noise also "uei", "ulog_ei", "upi", "uucb" (the criterion averaged over
         sigma points) and "robust_ei", ... (the criterion of the averaged outcome). By default "log_ei" without and
@@ -76,6 +78,9 @@ class Optimizer:
         What is asked of the outcome under input noise: "mean" (default), "mean-std", "var", "cvar" or "worst", or a
         `Risk` with parameters of its own. Any but the mean replaces the criterion by the expected improvement of that
         measure, or, for "worst", by its upper confidence bound.
+    trust_region
+        Whether the next trial is sought in a box around the best one that grows with success and shrinks without
+        (after TuRBO): an option for six variables and more; off by default.
     preset
         "thesis", or "thesis-rkhs", "thesis-gf", "thesis-gm", "thesis-gm-noise", "thesis-grasp": the settings of the
         thesis, with the constants that it chose by hand for that problem.
@@ -105,6 +110,7 @@ class Optimizer:
         border: str = "extend",
         kappa: float = 2.0,
         risk: str | Risk = "mean",
+        trust_region: bool = False,
         preset: str | None = None,
         lattice: Lattice | None = None,
     ):
@@ -123,7 +129,17 @@ class Optimizer:
             default = GaussianProcess(noise=noise, output_range=output_range)
             process = default if thesis is None else thesis.gaussian_process()
             tree = TREED if thesis is None else TreedSettings(thesis.min_leaf, continued=True)
-            self._surrogate = process if surrogate == "gp" else tree.surrogate(process, box, input_noise, self.seed)
+            if surrogate == "gp":
+                self._surrogate = process
+            elif surrogate == "tgp":
+                self._surrogate = tree.surrogate(process, box, input_noise, self.seed)
+            else:
+                self._surrogate = LocalGlobalProcess(output_range)
+                if preset is not None or noise not in ("none", 0.0):
+                    raise InputError(
+                        "surrogate 'local_global' has no preset and takes exact observations; "
+                        "leave preset= and noise= out, or choose 'gp' or 'tgp'."
+                    )
         if criterion is None:
             criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + (input_noise is not None)]
         name = criterion_name(criterion)
@@ -144,6 +160,8 @@ class Optimizer:
             margin=0.0 if thesis is None else thesis.margin,
             kappa=float(kappa),
             noisy=noise != "none" and noise != 0.0,
+            trust_region=trust_region,
+            n_initial=self.n_initial,
             thesis=thesis is not None,
         )
         self._lattice = lattice

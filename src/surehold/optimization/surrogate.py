@@ -42,6 +42,12 @@ class Regions(NamedTuple):
         """Return the unit cube as one region."""
         return cls(np.zeros((1, d)), np.ones((1, d)))
 
+    def within(self, box: "Regions") -> "Regions":
+        """Return the parts of these regions that lie in a box, given as a single region."""
+        lower, upper = np.maximum(self.lower, box.lower), np.minimum(self.upper, box.upper)
+        inside = (lower < upper).all(axis=1)
+        return Regions(lower[inside], upper[inside])
+
 
 class PartitionSummary(NamedTuple):
     """The tree of a surrogate in short."""
