@@ -16,11 +16,15 @@ from surehold.campaigns.sections import (
 )
 from surehold.campaigns.table import Records
 from surehold.campaigns.thesis import CLAIMS, OPEN_PLACES
+from surehold.problems.synthetic import RKHS
 
 
 def records_of(plan, runs, results, measure="best", **more):
     """Records as the tables give them: `results` {(problem, method): final values by seed}."""
-    cells = [{"problem": p, "method": m, "input_noise": None, "initial": 2, "trials": 4} for p, m in results]
+    cells = [
+        {"problem": p, "method": m, "function": p.lower(), "input_noise": None, "initial": 2, "trials": 4}
+        for p, m in results
+    ]
     records = Records({"plan": plan, "title": plan, "note": "", "runs": runs, "cells": cells, "format": "x"})
     for (p, m), values in results.items():
         for seed, value in enumerate(values):
@@ -129,6 +133,18 @@ def test_claims(shift, rkhs, gf):
     assert verdicts["GF", "table-4.1"] == gf
     assert verdicts["GM", "table-4.1"] == "no runs"
     assert verdicts["RKHS", "table-4.1-defaults"] == "no runs"
+
+
+def test_claims_that_are_not_shown_come_with_what_is_seen():
+    top = RKHS().optimum.value
+    results = {("RKHS", "GP"): [top] * 30 + [5.0], ("RKHS", "TGP-winf"): [top] * 31}
+    told = claim_results({"table-4.1": records_of("table-4.1", 100, results)})
+    (first,) = [t for t in told if t.claim.better == "TGP-winf" and t.claim.problem == "RKHS" and t.result]
+    assert first.verdict == "not shown"
+    assert first.reason == "within 1 % of the maximum end 30 of 31 runs of GP and 31 of 31 of TGP-winf"
+    few = {key: values[:5] for key, values in results.items()}
+    told = claim_results({"table-4.1": records_of("table-4.1", 100, few)})
+    assert next(t.reason for t in told if t.result) == "only 5 common seeds so far"
 
 
 def test_curves_are_means_with_bands_and_the_first_split():

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,13 @@ from surehold.campaigns.single_run import expanded
 from surehold.campaigns.statistics import LEVEL, Paired, Summary, holm, p_against, paired, summary
 from surehold.campaigns.table import Records
 from surehold.campaigns.thesis import CLAIMS, Claim, exhibit_of
+from surehold.problems.synthetic import SYNTHETIC, synthetic_function
 
 __all__ = ["ClaimResult", "Comparison", "Row", "claim_results", "comparisons", "final_values", "measures_of", "rows_of"]
 
 #: Measures that are better when they are low.
 LOWER: Final = ("std",)
+_FEW: Final = 20  # common seeds below which a missing difference says little
 LABELS: Final = {
     "best": "best observed value",
     "mean": "mean under input noise",
@@ -73,6 +75,8 @@ class ClaimResult:
     """Holm-adjusted within the table"""
     verdict: str
     """"holds", "not shown", "contradicted" or "no runs" """
+    reason: str
+    """why a claim does not hold, where that is seen; else empty"""
 
 
 def measures_of(records: Records) -> tuple[str, ...]:
@@ -164,7 +168,7 @@ def claim_results(campaigns: Mapping[str, Records]) -> list[ClaimResult]:
             ]
             adjusted = _holm_where([math.nan if t is None else t.p for t in told])
             results += [
-                ClaimResult(claim, name, t, p, _claim_word(claim, t, p))
+                ClaimResult(claim, name, t, p, word := _claim_word(claim, t, p), _reason(records, claim, t, word))
                 for claim, t, p in zip(claims, told, adjusted, strict=True)
             ]
     return results
@@ -194,6 +198,29 @@ def _claim_word(claim: Claim, difference: Paired | None, p: float) -> str:
     return {"better": "holds", "worse": "contradicted"}.get(word, "not shown")
 
 
+def _reason(records: Records | None, claim: Claim, difference: Paired | None, word: str) -> str:
+    if records is None or difference is None or word not in ("not shown", "contradicted"):
+        return ""
+    if difference.n < _FEW:
+        return f"only {difference.n} common seeds so far"
+    reference = final_values(records, claim.problem, claim.than, claim.measure)
+    function = next(cell["function"] for cell in records.header["cells"] if cell["problem"] == claim.problem)
+    if claim.measure == "best" and function in SYNTHETIC:
+        top = synthetic_function(function).optimum.value
+        there = sum(value >= 0.99 * top for value in reference.values())
+        other = final_values(records, claim.problem, claim.better, claim.measure)
+        also = sum(value >= 0.99 * top for value in other.values())
+        return (
+            f"within 1 % of the maximum end {there} of {len(reference)} runs of {claim.than} and {also} of "
+            f"{len(other)} of {claim.better}"
+        )
+    same = sum(
+        value == reference.get(seed)
+        for seed, value in final_values(records, claim.problem, claim.better, claim.measure).items()
+    )
+    return f"both give the same answer on {same} of {difference.n} seeds" if same else ""
+
+
 def _judged(row: Row, p: float) -> Row:
     verdict = ""
     if row.ours is not None and row.theirs is not None:
@@ -215,8 +242,3 @@ def _holm_where(p: Iterable[float]) -> list[float]:
     for i, adjusted in zip(places, holm([values[i] for i in places]), strict=True):
         values[i] = adjusted
     return values
-
-
-def as_data(value: Any) -> Any:
-    """Return a number for a CSV: empty where it is missing."""
-    return "" if value is None or (isinstance(value, float) and math.isnan(value)) else value

@@ -201,11 +201,12 @@ def claims_table(campaigns: Mapping[str, Records]) -> Table:
                 "0" if d is None else str(d.n),
                 "–" if d is None else f"{number(d.mean, 3)} ± {number(d.se, 2)}",
                 "–" if d is None or math.isnan(told.p) else _p(told.p),
+                told.reason,
                 told.verdict,
             )
         )
         marks.append(_MARKS[told.verdict])
-    head = ("claim of the thesis", "settings", "common seeds", "difference ± se", "p", "verdict")
+    head = ("claim of the thesis", "settings", "common seeds", "difference ± se", "p", "what is seen", "verdict")
     note = (
         "Wilcoxon's signed-rank test on common seeds, Holm-adjusted within a table of the thesis. A claim of no gain "
         "holds unless a gain is shown."
