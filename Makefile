@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: grasp test check bench clean
+.PHONY: grasp test check bench reproduction clean
 
 grasp: .venv/.installed
 	$(BIN)/surehold grasp mug
@@ -18,6 +18,9 @@ check: .venv/.developer
 
 bench: .venv/.developer
 	$(BIN)/python -m benchmarks
+
+reproduction: .venv/.installed
+	$(BIN)/python -m surehold.campaigns.reproduction --pack
 
 clean:
 	rm -rf .venv
