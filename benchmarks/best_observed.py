@@ -20,7 +20,7 @@ from surehold.campaigns.methods import Surehold
 from surehold.campaigns.peers import installed_peers
 
 BUDGETS = {"rkhs": (5, 50), "gf": (20, 60), "gm": (30, 140), "gf-stretched": (20, 60)}
-OURS = {"surehold gp": {}, "surehold tgp": {"surrogate": "tgp"}}
+OURS = {"surehold gp": {}, "surehold tgp": {"surrogate": "tgp"}, "surehold local-global": {"surrogate": "local_global"}}
 THESIS = {"surehold gp, thesis": {}, "surehold tgp, thesis": {"surrogate": "tgp"}}
 
 

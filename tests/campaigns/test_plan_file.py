@@ -1,3 +1,6 @@
+import re
+from pathlib import Path
+
 import pytest
 
 from surehold.campaigns.plan_file import load_plan, parse_plan, shipped_plans
@@ -75,6 +78,12 @@ def test_a_plan_from_python(tmp_path, cheap):
         load_plan(f"{tmp_path}/mine.py:other")
     with pytest.raises(InputError, match="did you mean 'plan'"):
         load_plan(f"{tmp_path}/mine.py:plant")
+
+
+def test_the_plan_of_the_readme_is_one():
+    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    assert len(parse_plan(block, "readme").cells()) == 3
 
 
 @pytest.mark.parametrize("name", shipped_plans())

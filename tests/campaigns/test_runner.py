@@ -1,9 +1,11 @@
+import gc
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 from dataclasses import replace
 from importlib.util import find_spec
 
@@ -172,6 +174,25 @@ def test_the_remaining_time_weighs_runs_by_their_kind():
     progress.finish({"problem": "a", "method": "m", "status": "done", "seconds": 2.0})
     progress.learn({"problem": "b", "method": "m", "status": "done", "seconds": 10.0})
     assert progress.remaining_seconds == pytest.approx((2 * 2.0 + 10.0 + 6.0) / 2)
+
+
+def test_memory_stays_flat(tmp_path, cheap):
+    """What a run leaves behind is its row: far less than its model, which would be hundreds of kilobytes."""
+    sizes = {}
+
+    def weigh(progress, row):
+        if progress.done in (4, 24):
+            gc.collect()
+            sizes[progress.done] = tracemalloc.get_traced_memory()[0]
+
+    plan = replace(cheap, problems={"hill": cheap.problems["hill"]}, runs=12)
+    run_campaign(plan, tmp_path / "warm", runs=1)
+    tracemalloc.start()
+    try:
+        run_campaign(plan, tmp_path / "out", observer=weigh)
+    finally:
+        tracemalloc.stop()
+    assert sizes[24] - sizes[4] < 20 * 20_000, f"{(sizes[24] - sizes[4]) / 20:.0f} bytes stay behind a run"
 
 
 def test_bad_arguments_are_refused(tmp_path, cheap):
