@@ -1,7 +1,9 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from surehold.grasping.contacts import AROUND, DEPTH, STATIONS, link_samples, palm_samples
+from surehold.grasping.contacts import AROUND, DEPTH, STATIONS, blended, link_samples, palm_samples, pass_share
 from surehold.grasping.grasp import Simulator
 from surehold.grasping.hand import LINKS, PALM
 from surehold.grasping.poses import default_pose
@@ -44,7 +46,7 @@ def test_single_has_one_contact_for_each_touching_link():
 def test_patch_is_graded_with_full_weight(graded):
     patch = Simulator(obj="mug", contact="patch")
     a, b = (s.grasp(side_pose(s, -0.06), -0.7).contacts for s in (graded, patch))
-    np.testing.assert_array_equal(a.points, b.points)
+    np.testing.assert_allclose(a.points, b.points, atol=5e-6)  # the touches are found to 5 micrometers
     np.testing.assert_array_equal(b.weights, 1.0)
     assert a.weights.min() < 0.3
 
@@ -105,3 +107,40 @@ def test_contacts_fade_out_at_the_depth(graded):
     deep = Simulator(obj="mug", contact="graded", depth=DEPTH / 2)
     pose = side_pose(graded, -0.06)
     assert len(deep.grasp(pose, -0.7).contacts) < len(graded.grasp(pose, -0.7).contacts)
+
+
+def test_a_narrow_hit_fades_into_a_narrow_miss():
+    """Where the thumb begins to go past the bottle the joint angles jump, and the quality does not."""
+    simulator = Simulator(obj="bottle")
+    poses = [
+        default_pose(simulator.hand, simulator.object, "right-front", 0.0087, (x, 0.0, 0.0, 0.0, 0.0, 0.0))
+        for x in np.arange(-0.0490, -0.0460, 0.000125)
+    ]
+    grasps = [simulator.grasp(pose, -0.7) for pose in poses]
+    assert len({"thumb distal" in g.touching for g in grasps}) == 2, "on one side it misses"
+    jumps = [np.abs(a.joints - b.joints).max() for a, b in pairwise(grasps)]
+    assert max(jumps) > 0.5
+    quality = np.array([g.quality for g in grasps])
+    assert quality[0] < 0.2 * quality[-1]
+    bend = np.abs(quality[:-2] - 2.0 * quality[1:-1] + quality[2:]) / 2.0
+    assert bend.max() < 0.01 * 0.1
+    assert np.abs(np.diff(quality)).max() < 0.005
+
+
+def test_the_share_of_a_pass():
+    assert pass_share(0.0, 0.01, 0.003) == 1.0
+    assert pass_share(0.003, 0.01, 0.003) == 0.0
+    assert pass_share(0.0015, 0.01, 0.003) == pytest.approx(0.5)
+    assert pass_share(0.001, 0.001, 0.003) == 0.0, "what stays is no pass"
+
+
+def test_blending_is_the_mean_force_at_the_mean_place():
+    a = np.array([[0.0, 0, 0, 1, 0, 0, 1.0, 3], [0, 0, 0, 0, 0, 0, 0, 3], [1, 0, 0, 1, 0, 0, 0.5, 3]])
+    b = np.array([[0.0, 1, 0, 0, 1, 0, 1.0, 3], [0, 1, 0, 0, 1, 0, 0.8, 3], [1, 0, 0, -1, 0, 0, 0.5, 3]])
+    mixed = blended([(0.5, a), (0.5, b)])
+    np.testing.assert_allclose(mixed[0], [0, 0.5, 0, np.sqrt(0.5), np.sqrt(0.5), 0, np.sqrt(0.5), 3])
+    np.testing.assert_allclose(mixed[1], [0, 1, 0, 0, 1, 0, 0.4, 3])
+    assert mixed[2, 6] == 0.0
+    np.testing.assert_allclose(
+        blended([(1.0, a), (0.0, b)]), a * (a[:, 6:7] > 0.0) + [[0] * 7 + [3]] * (a[:, 6:7] == 0.0)
+    )

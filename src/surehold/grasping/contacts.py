@@ -11,10 +11,16 @@
 `graded`   every skin sample within delta is a contact of weight w: continuous in pose and joint angles, because
            a contact fades in and out. The skin is sampled at fixed places of each link and of the palm.
 
+`graded` also feels what a link brushes past: see `Closed` in closing.py. A pass of gap g counts as a touch by the
+share a = (1 - g / delta) min(1, 4 (l - g) / delta), with l the gap to which the link leaves again. Each sample is the
+mixture of what it feels with the link held at the closest approach (share a) and with the link gone on (1 - a): the
+contact force that is the weighted mean of both, at the weighted mean of both points. A hit fades into a miss.
+
 Point and normal of a skin contact are those of the object's surface nearest to x - rho m, below the skin: bare x would
 see the normal turn over at once where it passes a sharp edge, a skin of thickness rho rolls over it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -27,7 +33,17 @@ from surehold.grasping.closing import link_ends
 from surehold.grasping.distance_field import field_distance, field_distance_gradient
 from surehold.grasping.hand import PALM, Hand, link_name
 
-__all__ = ["CONTACT_MODELS", "DEPTH", "Contacts", "as_contacts", "skin_contacts", "skin_samples", "touch_contacts"]
+__all__ = [
+    "CONTACT_MODELS",
+    "DEPTH",
+    "Contacts",
+    "as_contacts",
+    "blended",
+    "pass_share",
+    "skin_contacts",
+    "skin_samples",
+    "touch_contacts",
+]
 
 Array = NDArray[np.float64]
 
@@ -126,8 +142,9 @@ def skin_samples(hand: Hand) -> Array:
 
 @njit(cache=True)
 def skin_contacts(nodes, frame, ends, sides, radius, palm, samples, depth, skin, graded):
-    """Return contacts (c, 8) of all skin samples (m, 7) nearer than `depth`: point, inward normal, weight, body.
+    """Return contacts (m, 8) of all skin samples (m, 7): point, inward normal, weight, body.
 
+    The weight of a sample that is not nearer than `depth` is 0, and so are its point and normal.
     `sides` (5, 3) is the bending axis of each finger: the x axis of its links' frames is it, without its part along z.
     """
     pose = np.empty((21, 3, 4))
@@ -156,10 +173,10 @@ def skin_contacts(nodes, frame, ends, sides, radius, palm, samples, depth, skin,
             pose[body, i, 1] = pose[body, j, 2] * pose[body, k, 0] - pose[body, k, 2] * pose[body, j, 0]
         x, y, z = (pose[body, 0, 3], pose[body, 1, 3], pose[body, 2, 3])
         away[body] = field_distance(nodes, frame, x, y, z) > length + radius + depth
-    rows = np.empty((samples.shape[0], 8))
-    n = 0
+    rows = np.zeros((samples.shape[0], 8))
     for m in range(samples.shape[0]):
         body = int(samples[m, 0])
+        rows[m, 7] = body
         if away[body]:
             continue
         x, y, z = pose[body, 0, 3], pose[body, 1, 3], pose[body, 2, 3]
@@ -174,10 +191,32 @@ def skin_contacts(nodes, frame, ends, sides, radius, palm, samples, depth, skin,
         d = field_distance(nodes, frame, x, y, z)
         if d < depth:
             weight = min(1.0 - d / depth, 1.0) if graded else 1.0
-            n = _put(rows, n, nodes, frame, x - skin * u, y - skin * v, z - skin * w, weight, body)
-    return rows[:n]
+            _put(rows, m, nodes, frame, x - skin * u, y - skin * v, z - skin * w, weight, body)
+    return rows
+
+
+def pass_share(gap: float, leave: float, depth: float) -> float:
+    """Return by which share a pass of closest gap `gap`, that then leaves to `leave`, counts as a touch [m]."""
+    return max(1.0 - max(gap, 0.0) / depth, 0.0) * min(max(4.0 * (leave - gap) / depth, 0.0), 1.0)
+
+
+def blended(branches: Sequence[tuple[float, Array]]) -> Array:
+    """Return the mixture (m, 8) of outcomes for the same skin samples: pairs of share and contacts (m, 8)."""
+    shares = np.array([share for share, _ in branches])
+    rows = np.stack([rows for _, rows in branches])
+    weights = shares[:, None] * rows[:, :, 6]
+    total = weights.sum(axis=0)
+    safe = np.where(total > 0.0, total, 1.0)
+    force = np.einsum("bm,bmi->mi", weights, rows[:, :, 3:6])
+    size = np.sqrt(np.sum(force * force, axis=1))
+    mixed = np.empty_like(rows[0])
+    mixed[:, :3] = np.einsum("bm,bmi->mi", weights, rows[:, :, :3]) / safe[:, None]
+    mixed[:, 3:6] = force / np.where(size > 0.0, size, 1.0)[:, None]
+    mixed[:, 6], mixed[:, 7] = np.minimum(size, 1.0), rows[0, :, 7]
+    return mixed
 
 
 def as_contacts(rows: NDArray[np.float64]) -> Contacts:
-    """Return the rows (c, 8) of the compiled functions as `Contacts`."""
+    """Return the rows (c, 8) of the compiled functions as `Contacts`; rows of weight zero are left out."""
+    rows = rows[rows[:, 6] > 0.0]
     return Contacts(rows[:, :3].copy(), rows[:, 3:6].copy(), rows[:, 6].copy(), rows[:, 7].astype(np.int64))

@@ -7,13 +7,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.closing import CLOSING_MODES, close_hand, hand_gaps, link_ends
+from surehold.grasping.closing import CLOSING_MODES, Closed, close_hand, hand_gaps, link_ends
 from surehold.grasping.contacts import (
     CONTACT_MODELS,
     DEPTH,
     SKIN,
     Contacts,
     as_contacts,
+    blended,
+    pass_share,
     skin_contacts,
     skin_samples,
     touch_contacts,
@@ -38,6 +40,7 @@ QUALITIES: Final = ("epsilon", "volume")
 #: hand is inside the object. "not closed": contacts that do not resist every wrench. All but "ok" have quality 0.
 STATUSES: Final = ("ok", "no contact", "initial collision", "not closed")
 
+_LEAST_SHARE: Final = 1e-3  # outcomes of a smaller share are not looked at
 _NO_CONTACTS: Final = as_contacts(np.empty((0, 8)))
 
 
@@ -159,8 +162,9 @@ class Simulator:
         penetration = max(0.0, -float(gaps.min()))
         if penetration > 0.0:
             return Grasp("initial collision", 0.0, relative, s1, opened, opened, _NO_CONTACTS, (), penetration)
-        joints, touched = self._close(geometry, motion)
-        contacts = self._contacts(geometry, joints, touched)
+        closed = self._close(geometry, motion)
+        joints, touched = closed.joints, closed.touched
+        contacts = self._contacts(geometry, motion, closed)
         touching = tuple(link_name(int(body)) for body in np.flatnonzero(touched))
         if len(contacts) < 2:
             return Grasp("no contact", 0.0, relative, s1, joints, opened, contacts, touching, 0.0)
@@ -210,11 +214,11 @@ class Simulator:
         beside = Pose((float(-self.hand.grasp_center[0]), 0.0, float(self.object.box_center[2] - half[2] - 0.05)))
         motion = power_grasp(self.hand)
         geometry = self._place(beside)
-        joints, touched = self._close(geometry, motion)
-        self.gaps(beside, joints, geometry)
-        touched[3] = True
-        self._skin(geometry, joints)
-        self._touch(geometry, joints, touched)
+        closed = self._close(geometry, motion)
+        self.gaps(beside, closed.joints, geometry)
+        closed.touched[3] = True
+        self._skin(geometry, closed.joints)
+        self._touch(geometry, closed)
         points = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
         wrench_quality(points, -points, weights=np.ones(4))
 
@@ -233,31 +237,62 @@ class Simulator:
         # A finger bends about its base's -y; that abduction turns it by a few degrees is of no matter here.
         return _Geometry(np.ascontiguousarray(bases), palm, np.ascontiguousarray(-bases[:, :, 1]))
 
-    def _close(self, geometry: _Geometry, motion: ClosingMotion) -> tuple[Array, NDArray[np.bool_]]:
-        joints, touched, _ = close_hand(
-            self.field.nodes,
-            self.field.frame,
-            geometry.bases,
-            self.hand.chains,
-            self._reach,
-            np.stack(motion),
-            self.hand.radius,
-            geometry.palm,
-            self.hand.palm_half_extents,
-            self.hand.palm_rounding,
-            self.closing == "adaptive",
-            CLOSED,
+    def _close(self, geometry: _Geometry, motion: ClosingMotion, stop: Array | None = None) -> Closed:
+        return Closed(
+            *close_hand(
+                self.field.nodes,
+                self.field.frame,
+                geometry.bases,
+                self.hand.chains,
+                self._reach,
+                np.stack(motion),
+                self.hand.radius,
+                geometry.palm,
+                self.hand.palm_half_extents,
+                self.hand.palm_rounding,
+                self.closing == "adaptive",
+                CLOSED,
+                self.depth if self.contact == "graded" else 0.0,
+                np.full((5, 4), np.inf) if stop is None else stop,
+            )
         )
-        return joints, touched
 
-    def _contacts(self, geometry: _Geometry, joints: Array, touched: NDArray[np.bool_]) -> Contacts:
+    def _contacts(self, geometry: _Geometry, motion: ClosingMotion, closed: Closed) -> Contacts:
         if self.contact == "single":
-            return as_contacts(self._touch(geometry, joints, touched))
-        return as_contacts(self._skin(geometry, joints))
+            return as_contacts(self._touch(geometry, closed))
+        rows = self._skin(geometry, closed.joints)
+        if self.contact == "graded":
+            bodies = self._samples[:, 0]
+            for f in range(5):
+                branches = self._branches(geometry, motion, closed, f, 0.0)
+                if len(branches) > 1:
+                    mine = (bodies >= 4 * f) & (bodies < 4 * f + 4)
+                    rows[mine] = blended([(share, self._skin(geometry, joints)[mine]) for share, joints in branches])
+        return as_contacts(rows)
 
-    def _touch(self, geometry: _Geometry, joints: Array, touched: NDArray[np.bool_]) -> Array:
-        ends = link_ends(geometry.bases, self.hand.chains, joints)
-        return touch_contacts(self.field.nodes, self.field.frame, ends, touched, self.hand.radius)
+    def _branches(
+        self, geometry: _Geometry, motion: ClosingMotion, closed: Closed, finger: int, after: float
+    ) -> list[tuple[float, Array]]:
+        """Return share and joint angles of each outcome of a finger: held where a link brushes past, or gone on."""
+        branches: list[tuple[float, Array]] = []
+        left = 1.0
+        links = range(4 * finger, 4 * finger + 4)
+        for time, link in sorted(
+            (float(closed.pass_time[b]), b) for b in links if after < closed.pass_time[b] < CLOSED
+        ):
+            share = left * pass_share(float(closed.pass_gap[link]), float(closed.pass_leave[link]), self.depth)
+            if share < _LEAST_SHARE:
+                continue
+            stop = np.full((5, 4), np.inf)
+            stop[finger, : (link % 4 + 1 if self.closing == "adaptive" else 4)] = time
+            held = self._close(geometry, motion, stop)
+            branches += [(share * s, joints) for s, joints in self._branches(geometry, motion, held, finger, time)]
+            left -= share
+        return [*branches, (left, closed.joints)]
+
+    def _touch(self, geometry: _Geometry, closed: Closed) -> Array:
+        ends = link_ends(geometry.bases, self.hand.chains, closed.joints)
+        return touch_contacts(self.field.nodes, self.field.frame, ends, closed.touched, self.hand.radius)
 
     def _skin(self, geometry: _Geometry, joints: Array) -> Array:
         return skin_contacts(
