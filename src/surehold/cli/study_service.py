@@ -13,7 +13,7 @@ __all__ = ["commands"]
 
 def commands() -> list[tuple[str, Callable[..., Any]]]:
     """Return the commands by name."""
-    return [("work", work)]
+    return [("work", work), ("serve", serve)]
 
 
 def work(
@@ -56,3 +56,27 @@ def work(
             console.print(f"Ended after {count} trials; the one under way is let go.", markup=False)
             raise typer.Exit(130) from None
     console.print(f"Done: {count} trials by this worker.", markup=False)
+
+
+def serve(
+    name: Name,
+    port: Annotated[int, typer.Option(help="On the loopback interface; 0 takes a free one.", min=0, max=65535)] = 8765,
+    token: Annotated[
+        str,
+        typer.Option(
+            envvar="SUREHOLD_TOKEN", help="What callers must send; by default a new one is made.", show_default=False
+        ),
+    ] = "",
+    storage: Storage = "",
+) -> None:
+    """Answer ask, tell and the rest over HTTP, for this machine only."""
+    from surehold.studies.service import listening, new_token, service
+
+    study = opened(name, storage)
+    secret = token or new_token()
+    with listening(port) as server:
+        application = service(study, secret)
+        typer.echo(f"Serving study {name} at {server.address}/ ; Ctrl-C ends it.")
+        if not token:
+            typer.echo(f"Callers send the header: Authorization: Bearer {secret}")
+        server.run(application)

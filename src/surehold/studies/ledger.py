@@ -15,7 +15,20 @@ from surehold.errors import InputError
 from surehold.studies.history import REACHED
 from surehold.studies.search_space import SearchSpace
 
-__all__ = ["HOLDER", "NOTE", "PROMISE", "VETOED", "Holder", "Ledger", "Told", "answer_of", "checked_value", "holder_of"]
+__all__ = [
+    "HOLDER",
+    "NOTE",
+    "PROMISE",
+    "VETOED",
+    "AnswerRefused",
+    "Holder",
+    "Ledger",
+    "Told",
+    "UnknownTrial",
+    "answer_of",
+    "checked_value",
+    "holder_of",
+]
 
 #: Trial attributes: who makes the trial (a `Holder`), what the model expected to gain, how the trial came about, why it
 #: was forbidden.
@@ -25,6 +38,14 @@ NOTE: Final = "surehold:note"
 VETOED: Final = "surehold:vetoed"
 
 _ATTEMPTS: Final = 5  # a trial that has taken so many workers with it counts as failed
+
+
+class UnknownTrial(InputError):
+    """There is no trial of that id."""
+
+
+class AnswerRefused(InputError):
+    """The trial was told something else before, or is not in a state in which it can be told or vetoed."""
 
 
 class Holder(NamedTuple):
@@ -69,7 +90,7 @@ class Ledger:
         n = self._backend.get_n_trials(self._study_id)
         if id >= n:
             there = f"the last one is {n - 1}" if n else "none has been asked for"
-            raise InputError(f"trial {id} is not in study '{self._name}'; {there}.")
+            raise UnknownTrial(f"trial {id} is not in study '{self._name}'; {there}.")
         return self._backend.get_trial(self._backend.get_trial_id_from_study_id_trial_number(self._study_id, id))
 
     def store(
@@ -122,7 +143,7 @@ class Ledger:
         trial = self.trial(id)
         actual = None if reached is None else self._space.check(trial.params | dict(reached), "reached")
         if trial.state == TrialState.WAITING:
-            raise InputError(f"trial {id} has not been handed out yet; ask for it first.")
+            raise AnswerRefused(f"trial {id} has not been handed out yet; ask for it first.")
         state = "failed" if number is None else "complete"
         if not trial.state.is_finished():
             try:
@@ -139,7 +160,7 @@ class Ledger:
         now = "failed" if number is None else f"value {number!r}"
         elsewhere = actual is not None and actual != trial.user_attrs.get(REACHED, trial.params)
         if before != now or elsewhere:
-            raise InputError(
+            raise AnswerRefused(
                 f"trial {id} was told before: {before}; now: {now}{', reached elsewhere' * elsewhere}. The first "
                 "answer counts; add the other one as a trial of its own if it was made."
             )
@@ -154,7 +175,7 @@ class Ledger:
         except UpdateFinishedTrialError:
             trial = self.trial(id)
             if VETOED not in trial.user_attrs:
-                raise InputError(
+                raise AnswerRefused(
                     f"trial {id} is finished ({answer_of(trial)}); only a pending one can be vetoed."
                 ) from None
 

@@ -1,0 +1,252 @@
+"""A study over HTTP, on the loopback interface: for robot controllers and ROS nodes in any language.
+
+Every request carries the token (`Authorization: Bearer TOKEN`). What is answered has been stored before. Mistakes of
+the caller are answered with 4xx and `{"detail": what is wrong and what to do}`; only a storage that is away with 503.
+"""
+
+import hmac
+import html
+import secrets
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any, Final
+
+from fastapi import Depends, FastAPI, HTTPException, Path, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import HTMLResponse, JSONResponse
+from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from surehold import __version__
+from surehold.errors import InputError, SureholdError
+from surehold.studies import service_messages as wire
+from surehold.studies.ledger import AnswerRefused, UnknownTrial
+from surehold.studies.robot import NothingToAsk, RobotStudy
+from surehold.studies.status import rows, status
+from surehold.studies.storage import StorageFailure
+
+__all__ = ["HOST", "LARGEST_BODY", "Server", "listening", "new_token", "service"]
+
+HOST: Final = "127.0.0.1"
+LARGEST_BODY: Final = 64 * 1024  # bytes
+_DROPPED: Final = 64 * 1024 * 1024  # bytes that are read of a body that is too large
+
+_bearer = HTTPBearer(auto_error=False, description="The token that `surehold study serve` printed.")
+
+
+def new_token() -> str:
+    """Return a token that nobody can guess."""
+    return secrets.token_urlsafe(24)
+
+
+class Server:
+    """A port of the loopback interface that is listened to; `address` is its URL."""
+
+    def __init__(self, listener: socket.socket):
+        self._listener = listener
+        self.address: Final = f"http://{HOST}:{listener.getsockname()[1]}"
+
+    def run(self, application: FastAPI) -> None:
+        """Answer requests until Ctrl-C or SIGTERM."""
+        import uvicorn
+
+        configuration = uvicorn.Config(application, log_level="warning", access_log=False)
+        uvicorn.Server(configuration).run(sockets=[self._listener])
+
+
+@contextmanager
+def listening(port: int) -> Iterator[Server]:
+    """Listen to a port, 0 for a free one; raises InputError if it is taken or none."""
+    try:
+        listener = socket.create_server((HOST, port))
+    except (OSError, OverflowError) as error:
+        raise InputError(f"port {port} cannot be used: {getattr(error, 'strerror', None) or error}.") from None
+    with listener:
+        yield Server(listener)
+
+
+def service(study: RobotStudy, token: str) -> FastAPI:
+    """Return the application that answers for one study.
+
+    Raises
+    ------
+    InputError
+        If the token is shorter than 16 characters, or could not stand in a header.
+    """
+    if len(token) < 16 or not token.isascii() or not token.isprintable() or " " in token:
+        raise InputError("the token must be 16 printable ASCII characters or more, without spaces.")
+
+    def authorized(given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]) -> None:
+        if given is None or not hmac.compare_digest(given.credentials.encode(), token.encode()):
+            message = "the token is missing or wrong; send the header 'Authorization: Bearer TOKEN'."
+            raise HTTPException(401, message, {"WWW-Authenticate": "Bearer"})
+
+    def served(name: Annotated[str, Path(json_schema_extra={"enum": [study.name]})]) -> None:
+        if name != study.name:
+            raise HTTPException(404, f"study {name[:100]!r} is not served here; this is '{study.name}'.")
+
+    problems: dict[int | str, dict[str, Any]] = {
+        code: {"model": wire.Problem} for code in (400, 401, 404, 409, 413, 422, 503)
+    }
+    app = FastAPI(
+        title=f"surehold study {study.name}",
+        version=__version__,
+        description=__doc__ or "",
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+        responses=problems,
+    )
+    app.add_middleware(_SmallBodies)
+    _say_what_is_wrong(app)
+    writing = threading.Lock()  # one recommendation is written at a time
+    protected: dict[str, Any] = {"dependencies": [Depends(authorized), Depends(served)]}
+
+    @app.get("/", response_class=HTMLResponse, include_in_schema=False)
+    def page() -> str:
+        return _page(app)
+
+    @app.get("/health")
+    def health() -> dict[str, bool]:
+        """Tell that the service is alive; needs no token."""
+        return {"alive": True}
+
+    @app.get("/studies/{name}/status", **protected)
+    def state() -> dict[str, Any]:
+        """Return the state of the study, and the trials under way."""
+        return status(study)
+
+    @app.post("/studies/{name}/ask", **protected)
+    def ask(question: wire.Question) -> wire.AskedTrial:
+        """Hand out the next trial."""
+        asked = study.ask(question.worker)
+        return wire.AskedTrial(id=asked.id, parameters=asked.parameters, units=asked.units, again=asked.again)
+
+    @app.post("/studies/{name}/tell", **protected)
+    def tell(answer: wire.Answer) -> wire.Taken:
+        """Take what came of a trial; the same answer twice is harmless."""
+        told = study.tell(answer.id, answer.value, failed=answer.failed, reached=answer.reached)
+        return wire.Taken(id=told.id, state=told.state, value=told.value, already=told.already)
+
+    @app.get("/studies/{name}/recommendation", **protected)
+    def recommendation() -> dict[str, Any]:
+        """Return the trial that still holds when the input is off, and note it in the study."""
+        with writing:
+            return study.recommend().as_dict() | {"units": dict(study.settings.units)}
+
+    @app.get("/studies/{name}/next", **protected)
+    def next_trial() -> wire.NextTrial:
+        """Return what would be asked next, without asking."""
+        return wire.NextTrial(parameters=study.next(), expected_improvement=study.promise())
+
+    @app.get("/studies/{name}/trials", **protected)
+    def trials() -> list[dict[str, Any]]:
+        """Return all trials."""
+        return rows(study)
+
+    @app.post("/studies/{name}/add", **protected)
+    def add(addition: wire.Addition) -> wire.Added:
+        """Add a trial that was made by hand."""
+        id = study.add(addition.parameters, addition.value, failed=addition.failed, reached=addition.reached)
+        return wire.Added(id=id)
+
+    @app.post("/studies/{name}/veto", **protected)
+    def veto(veto: wire.Veto) -> wire.Added:
+        """Forbid a trial that was handed out."""
+        study.veto(veto.id, veto.reason)
+        return wire.Added(id=veto.id)
+
+    @app.post("/studies/{name}/pause", **protected)
+    def pause(reason: wire.Reason) -> wire.State:
+        """Hand out nothing until resumed."""
+        study.pause(reason.reason)
+        return wire.State(name=study.name, state="paused")
+
+    @app.post("/studies/{name}/resume", **protected)
+    def resume() -> wire.State:
+        """Hand out trials again."""
+        study.resume()
+        return wire.State(name=study.name, state="open")
+
+    return app
+
+
+def _say_what_is_wrong(app: FastAPI) -> None:
+    def answer(code: int, detail: str) -> JSONResponse:
+        return JSONResponse({"detail": " ".join(detail.split())}, code)
+
+    @app.exception_handler(RequestValidationError)
+    def malformed(_: Request, error: RequestValidationError) -> JSONResponse:
+        # Not the default answer: it repeats the input, which may hold what JSON cannot (NaN).
+        wrong = [f"{'.'.join(str(part) for part in e['loc'])}: {e['msg']}" for e in error.errors()]
+        return answer(422, "; ".join(wrong))
+
+    @app.exception_handler(SureholdError)
+    def refused(_: Request, error: SureholdError) -> JSONResponse:
+        codes = (
+            (StorageFailure, 503),
+            (UnknownTrial, 404),
+            (AnswerRefused, 409),
+            (InputError, 422),
+            (NothingToAsk, 409),
+        )
+        return answer(next((code for kind, code in codes if isinstance(error, kind)), 409), str(error))
+
+
+class _SmallBodies:
+    """Reads a request's body before anything else does, and answers 413 where it is too large."""
+
+    def __init__(self, app: ASGIApp):
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        messages: list[Message] = []
+        size, more = 0, True
+        while more:
+            message = await receive()
+            size += len(message.get("body", b""))
+            if size <= LARGEST_BODY:
+                messages.append(message)
+            # What is too large is read all the same, and dropped: a caller that is still sending hears no answer.
+            more = message["type"] == "http.request" and message.get("more_body", False) and size < _DROPPED
+        if size > LARGEST_BODY:
+            detail = f"the body is larger than {LARGEST_BODY} bytes."
+            await JSONResponse({"detail": detail}, 413, {"Connection": "close"})(scope, receive, send)
+            return
+
+        async def replay() -> Message:
+            return messages.pop(0) if messages else await receive()
+
+        await self._app(scope, replay, send)
+
+
+def _page(app: FastAPI) -> str:
+    """Return the OpenAPI description as a page that needs no network."""
+    described = app.openapi()
+    lines = [
+        f"<h1>{html.escape(described['info']['title'])}</h1>",
+        f"<p>{html.escape(described['info']['description'])}</p>",
+    ]
+    lines.append('<p>As <a href="openapi.json">openapi.json</a>, for machines.</p><dl>')
+    schemas = described["components"]["schemas"]
+    for path, methods in described["paths"].items():
+        for method, operation in methods.items():
+            lines.append(f"<dt><code>{method.upper()} {html.escape(path)}</code></dt>")
+            lines.append(f"<dd>{html.escape(operation['description'])}{_fields(operation, schemas)}</dd>")
+    style = "body{font:16px/1.5 sans-serif;max-width:50em;margin:2em auto;padding:0 1em}dt{margin-top:1em}"
+    return f"<!doctype html><meta charset=utf-8><title>surehold</title><style>{style}</style>{''.join(lines)}</dl>"
+
+
+def _fields(operation: dict[str, Any], schemas: dict[str, Any]) -> str:
+    body = operation.get("requestBody", {}).get("content", {}).get("application/json", {}).get("schema", {})
+    if "$ref" not in body:
+        return ""
+    schema = schemas[body["$ref"].rsplit("/", 1)[-1]]
+    required = schema.get("required", [])
+    names = [f"{name}{'' if name in required else ' (optional)'}" for name in schema["properties"]]
+    return f" <br>Body: <code>{html.escape(', '.join(names))}</code>"

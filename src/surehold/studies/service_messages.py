@@ -1,0 +1,122 @@
+"""What goes over the wire of the HTTP service.
+
+Unknown fields, text in place of numbers, and numbers that are not finite are refused.
+"""
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+__all__ = [
+    "Added",
+    "Addition",
+    "Answer",
+    "AskedTrial",
+    "NextTrial",
+    "Problem",
+    "Question",
+    "Reason",
+    "State",
+    "Taken",
+    "Veto",
+]
+
+
+def _whole(value: Any) -> Any:
+    """Return 7 for 7.0: to JSON they are the same number."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+_Id = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=2**31 - 1, description="Of the trial, as ask gave it.")]
+_Value = Annotated[float | None, Field(allow_inf_nan=False, description="Outcome, larger is better.")]
+_Text = Annotated[str, Field(max_length=2000)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Parameters = dict[str, int | _Finite | str | bool | None]
+
+
+class _Request(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class Question(_Request):
+    """Who asks."""
+
+    worker: Annotated[
+        str | None,
+        Field(max_length=200, description="Who makes the trial; asked again before it was told, gets the same trial."),
+    ] = None
+
+
+class Answer(_Request):
+    """What came of a trial."""
+
+    id: _Id
+    value: _Value = None
+    failed: bool = False
+    reached: Annotated[_Parameters | None, Field(description="What was truly reached, where it differs.")] = None
+
+
+class Addition(_Request):
+    """A trial that was made by hand."""
+
+    parameters: _Parameters
+    value: _Value = None
+    failed: bool = False
+    reached: _Parameters | None = None
+
+
+class Veto(_Request):
+    """A trial that must not be made."""
+
+    id: _Id
+    reason: _Text = ""
+
+
+class Reason(_Request):
+    """Why."""
+
+    reason: _Text = ""
+
+
+class AskedTrial(BaseModel):
+    """A trial to be made."""
+
+    id: int
+    parameters: dict[str, Any]
+    units: dict[str, str]
+    again: bool
+
+
+class Taken(BaseModel):
+    """An answer that was stored."""
+
+    id: int
+    state: str
+    value: float | None
+    already: bool
+
+
+class Added(BaseModel):
+    """A trial that was stored."""
+
+    id: int
+
+
+class NextTrial(BaseModel):
+    """What would be asked next."""
+
+    parameters: dict[str, Any]
+    expected_improvement: float | None
+
+
+class State(BaseModel):
+    """Of a study, after a ruling."""
+
+    name: str
+    state: str
+
+
+class Problem(BaseModel):
+    """What was wrong, and what to do."""
+
+    detail: str

@@ -1,0 +1,215 @@
+import subprocess
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import httpx
+import pytest
+from optuna.trial import TrialState
+
+import surehold as sh
+from surehold.errors import InputError
+from surehold.studies.robot import RobotStudy
+from surehold.studies.search_space import SearchSpace
+from surehold.studies.settings import StudySettings
+from surehold.studies.stop_rule import StopRule
+
+TOKEN = "0123456789abcdef0123"
+SPACE = SearchSpace({"dx": (-0.05, 0.05), "dy": (-0.03, 0.03)})
+SETTINGS = StudySettings(SPACE, sh.InputNoise.unit(0.03), {"dx": "m", "dy": "m"}, {"n_initial": 6})
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    """A real service in a process of its own, and a client that knows its token."""
+    url = str(tmp_path_factory.mktemp("served") / "journal.log")
+    study = RobotStudy.create("mug", SETTINGS, url)
+    command = [sys.executable, "-m", "surehold", "study", "serve", "mug", "--storage", url, "--port", "0"]
+    process = subprocess.Popen([*command, "--token", TOKEN], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    line = process.stdout.readline()
+    assert "Serving study mug" in line, process.communicate()
+    address = line.split(" at ")[1].split("/ ")[0]
+    client = httpx.Client(base_url=f"{address}/studies/mug", headers={"Authorization": f"Bearer {TOKEN}"}, timeout=60)
+    with client:
+        yield client, study, address
+    process.terminate()
+    _, errors = process.communicate(timeout=30)
+    assert "Traceback" not in errors, errors
+
+
+@pytest.fixture
+def client(served):
+    yield served[0]
+    assert served[0].get(f"{served[2]}/health").json() == {"alive": True}, "the service died"
+
+
+@pytest.fixture
+def study(served):
+    return served[1]
+
+
+def test_ask_and_tell(client, study):
+    asked = client.post("/ask", json={}).json()
+    assert asked["units"] == {"dx": "m", "dy": "m"}
+    stored = study.trials()[asked["id"]]
+    assert stored.state == TrialState.RUNNING, "answered before it was stored"
+    assert stored.params == asked["parameters"]
+    answer = {"id": asked["id"], "value": 0.5, "reached": {"dx": 0.001}}
+    assert client.post("/tell", json=answer).json() == {
+        "id": asked["id"], "state": "complete", "value": 0.5, "already": False,
+    }  # fmt: skip
+    assert study.trials()[asked["id"]].value == 0.5
+    assert client.post("/tell", json=answer).json()["already"]
+    different = client.post("/tell", json=answer | {"value": 0.6})
+    assert different.status_code == 409
+    assert "told before: value 0.5" in different.json()["detail"]
+    best = client.get("/recommendation").json()
+    assert best["trial"] == asked["id"]
+    assert best["parameters"]["dx"] == 0.001
+
+
+def test_people_in_the_loop(client, study):
+    asked = client.post("/ask", json={"worker": "arm"}).json()
+    assert client.post("/ask", json={"worker": "arm"}).json() == asked | {"again": True}
+    assert client.post("/veto", json={"id": asked["id"], "reason": "table"}).status_code == 200
+    assert client.post("/tell", json={"id": asked["id"], "value": 1.0}).status_code == 409
+    preview = client.get("/next").json()["parameters"]
+    assert client.post("/pause", json={"reason": "lunch"}).json()["state"] == "paused"
+    paused = client.post("/ask", json={})
+    assert paused.status_code == 409
+    assert "paused (lunch)" in paused.json()["detail"]
+    assert client.get("/status").json()["state"] == "paused"
+    assert client.post("/resume").json()["state"] == "open"
+    assert client.post("/ask", json={}).json()["parameters"] == preview
+    added = client.post("/add", json={"parameters": {"dx": 0.0, "dy": 0.0}, "value": 0.1}).json()["id"]
+    assert client.get("/trials").json()[added]["value"] == 0.1
+    study.set_stop_rule(StopRule(trials=1))
+    stopped = client.post("/ask", json={})
+    assert stopped.status_code == 409
+    assert "budget" in stopped.json()["detail"]
+    study.set_stop_rule(StopRule())
+
+
+BAD_BODIES = [
+    b"", b"{", b"[]", b"null", b'"text"', b"\xff\xfe", b"[" * 30_000, b'{"id": 0, "value": NaN}',
+    b'{"id": 0, "value": Infinity}', b'{"id": 0, "value": 1e999}', b'{"id": 0, "value": "0.5"}',
+    b'{"id": 0, "value": true}', b'{"id": 0, "value": [1]}', b'{"id": 0, "value": 1, "failed": true}',
+    b'{"id": 0}', b'{"id": -1, "value": 1}', b'{"id": 1.5, "value": 1}', b'{"id": "0", "value": 1}',
+    b'{"id": 99999999999999999999999, "value": 1}', b'{"value": 1}', b'{"id": 0, "value": 1, "extra": 1}',
+    b'{"id": 0, "value": 1, "reached": {"dx": 9}}', b'{"id": 0, "value": 1, "reached": {"dz": 0}}',
+    b'{"id": 0, "value": 1, "reached": {"dx": NaN}}', b'{"id": 0, "value": 1, "reached": [1, 2]}',
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("body", BAD_BODIES)
+def test_bad_answers(client, study, body):
+    before = len(study.trials()), [t.state for t in study.trials()]
+    response = client.post("/tell", content=body, headers={"Content-Type": "application/json"})
+    assert 400 <= response.status_code < 500, response.text
+    assert response.json()["detail"]
+    assert (len(study.trials()), [t.state for t in study.trials()]) == before
+
+
+def test_unknown_ids_and_names(client):
+    response = client.post("/tell", json={"id": 2_000_000, "value": 1.0})
+    assert (response.status_code, "not in study" in response.json()["detail"]) == (404, True)
+    root = str(client.base_url).rstrip("/").removesuffix("/studies/mug")
+    for name in (
+        "cup",
+        "..",
+        "%2e%2e",
+        "..%2f..%2fetc%2fpasswd",
+        "%00",
+        "mug%2f..%2fcup",
+        "mug ",
+        "a" * 5000,
+        "%F0%28",
+    ):
+        response = client.post(f"{root}/studies/{name}/ask", json={})
+        assert response.status_code in (404, 405), (name, response.status_code)
+    for path in ("/studies", "/../etc/passwd", "//etc/passwd", "/studies/mug/ask/../../../x"):
+        assert client.get(root + path).status_code in (404, 405)
+    assert client.put(f"{root}/studies/mug/ask").status_code == 405
+
+
+@pytest.mark.parametrize(
+    "header", [None, "", "Bearer", "Bearer wrong", f"Basic {TOKEN}", f"Bearer {TOKEN}x", "Bearer é"]
+)
+def test_without_the_token(client, header):
+    headers = {} if header is None else {"Authorization": header.encode("latin-1")}
+    root = str(client.base_url)
+    for method, path in (("GET", "status"), ("GET", "trials"), ("POST", "ask"), ("POST", "tell"), ("POST", "pause")):
+        response = httpx.request(method, root + path, headers=headers, json={} if method == "POST" else None)
+        assert response.status_code in (401, 422), response.text
+        assert response.status_code == 401 or path == "tell"
+        assert "id" not in response.json()
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_oversized_bodies(client, chunked):
+    piece = b" " * 1024
+    content = (piece for _ in range(200)) if chunked else piece * 200
+    response = client.post("/ask", content=content, headers={"Content-Type": "application/json"})
+    assert response.status_code == 413
+    assert "larger than" in response.json()["detail"]
+
+
+def test_the_page_and_the_description(client):
+    root = str(client.base_url).removesuffix("studies/mug/")
+    page = httpx.get(root)
+    assert "POST /studies/{name}/ask" in page.text
+    assert "http" not in page.text.split("<body>")[-1].replace("openapi.json", ""), "the page must need no network"
+    described = httpx.get(f"{root}openapi.json").json()
+    assert described["paths"]["/studies/{name}/tell"]["post"]["requestBody"]["required"]
+
+
+def test_clients_at_once_lose_nothing(client, study):
+    """8 clients ask and tell 80 trials; benchmarks/study_service.py does it with a thousand."""
+    before = len(study.trials())
+    lock, told = threading.Lock(), {}
+
+    def robot(k):
+        with httpx.Client(base_url=client.base_url, headers=client.headers, timeout=60) as own:
+            for _ in range(10):
+                asked = own.post("/ask", json={"worker": f"robot {k}"}).json()
+                value = -abs(asked["parameters"]["dx"])
+                assert own.post("/tell", json={"id": asked["id"], "value": value}).status_code == 200
+                with lock:
+                    assert asked["id"] not in told
+                    told[asked["id"]] = value
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(robot, range(8)))
+    stored = study.trials()[before:]
+    assert {t.number: t.value for t in stored} == told
+    assert len(told) == 80
+    assert len({tuple(t.params.values()) for t in stored}) == 80
+
+
+def test_the_port_and_the_token_are_checked(tmp_path):
+    from surehold.studies.service import listening, new_token, service
+
+    study = RobotStudy.create("mug", SETTINGS, str(tmp_path / "journal.log"))
+    for token in ("", "short", "with spaces in between", "x" * 15, "ü" * 20, "line\nbreak" * 3):
+        with pytest.raises(InputError, match="token"):
+            service(study, token)
+    assert new_token() != new_token()
+    with listening(0) as server:
+        port = int(server.address.rsplit(":", 1)[1])
+        with pytest.raises(InputError, match="cannot be used"), listening(port):
+            pass
+
+
+def test_schemathesis_finds_nothing(served):
+    """Requests made up from the OpenAPI description, good and bad ones: no 5xx, no answer that it does not describe.
+
+    Left out is the check that whatever fits the description is accepted: it cannot say that a value or `failed` must be
+    there, nor which ranges the parameters have.
+    """
+    _, _, address = served
+    command = [sys.executable, "-m", "schemathesis.cli", "run", f"{address}/openapi.json", "--checks", "all"]
+    command += ["--header", f"Authorization: Bearer {TOKEN}", "--max-examples", "4", "--seed", "1", "--no-color"]
+    command += ["--exclude-checks", "positive_data_acceptance"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "Tested: 11" in run.stdout, run.stdout
