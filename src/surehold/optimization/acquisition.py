@@ -175,11 +175,12 @@ def where_to_look(
     weights = np.append(perturbations.quadrature.weights, 1.0)
     variance_g = posterior.average(u[None, :], offsets, weights[:-1]).variance  # (m, 1)
     variance_f = posterior.moments(points).variance  # (m, c)
-    gain = np.empty(len(points))
-    for i, point in enumerate(points):
-        both = posterior.average(u[None, :], np.concatenate([offsets, (point - u)[None, :]]), weights).variance
-        covariance = 0.5 * (both[:, 0] - variance_g[:, 0] - variance_f[:, i])
-        total = variance_f[:, i] + noise_variance
-        share = np.divide(covariance, np.sqrt(total), out=np.zeros_like(total), where=total > 0.0)
-        gain[i] = np.mean(share**2)
+    together = np.concatenate(
+        [np.tile(offsets, (len(points), 1, 1)), (points - u)[:, None, :]], axis=1
+    )  # (c, s + 1, d)
+    both = posterior.average(np.tile(u, (len(points), 1)), together, weights).variance
+    covariance = 0.5 * (both - variance_g - variance_f)  # (m, c)
+    total = variance_f + noise_variance
+    share = np.divide(covariance, np.sqrt(total), out=np.zeros_like(total), where=total > 0.0)
+    gain = np.mean(share**2, axis=0)
     return points[np.argsort(-gain, kind="stable")]

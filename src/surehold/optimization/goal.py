@@ -64,8 +64,11 @@ class Goal:
         """
         if observed is not None and not self.noisy and len(self.accurate.quadrature.weights) == 1:
             return np.argsort(-observed, kind="stable")
-        first = self.accurate if self.thesis else self.coarse
-        order = np.argsort(-_outcomes(posterior, first, U), kind="stable")
+        if self.thesis:
+            first = _outcomes(posterior, self.accurate, U)
+        else:
+            first = _outcomes(posterior.thinned(_SCREENED), self.coarse, U)
+        order = np.argsort(-first, kind="stable")
         top = order[:_SHORTLIST]
         if self.risk.name == "mean":
             values = _outcomes(posterior, self.accurate, U[top])
