@@ -31,7 +31,9 @@ def studies() -> typer.Typer:
         *study_service.commands(),
     ]
     for name, command in commands:
-        group.command(name)(command)
+        # A negative value is no option: tell NAME 3 -0.5
+        settings = {"ignore_unknown_options": True} if name in ("tell", "add") else {}
+        group.command(name, context_settings=settings)(command)
     return group
 
 

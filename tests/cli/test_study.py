@@ -1,0 +1,233 @@
+import json
+import subprocess
+import sys
+
+import pytest
+
+from surehold.cli import run
+
+OWN = """
+def hill(x):
+    return 1.0 - float(((x - 0.3) ** 2).sum())
+def by_name(p):
+    return p["n"] - (p["grip"] == "power")
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    (tmp_path / "own.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("SUREHOLD_STORAGE", raising=False)
+    return tmp_path
+
+
+@pytest.fixture
+def study(capsys):
+    """Call `surehold study` and return its exit code and its answer in JSON."""
+
+    def call(line, code=0):
+        capsys.readouterr()
+        found = run(["study", *line.split(), "--json"])
+        out, err = capsys.readouterr()
+        assert found == code, err
+        return json.loads(out) if out.strip() else err
+
+    return call
+
+
+CREATE = "create mug --parameters dx=-0.05:0.05,dy=-0.03:0.03 --noise dx=0.003,dy=0.003 --units dx=m,dy=m --initial 4"
+
+
+def test_a_robot_by_commands(study, here):
+    made = study(CREATE)
+    assert made["input_noise"] == {"standard_deviations": {"dx": 0.003, "dy": 0.003}}
+    for k in range(6):
+        asked = study("ask mug")
+        assert asked["id"] == k
+        assert asked["units"] == {"dx": "m", "dy": "m"}
+        x = asked["parameters"]
+        told = study(f"tell mug {k} {1.0 - 40.0 * abs(x['dx'] - 0.01) - 20.0 * abs(x['dy'])!r}")
+        assert told == {"id": k, "state": "complete", "value": told["value"], "already": False}
+        assert study(f"tell mug {k} {told['value']!r}")["already"]
+    assert "told before" in study("tell mug 0 7", code=2)
+    failed = study("ask mug --worker arm")
+    assert study("ask mug --worker arm") == failed | {"again": True}
+    assert study("tell mug 6 --failed")["state"] == "failed"
+    reached = study("ask mug")
+    study(f"tell mug {reached['id']} 0.9 --reached dx=0.0101")
+    preview = study("next mug")
+    assert preview["expected_improvement"] > 0.0
+    assert study("ask mug")["parameters"] == preview["parameters"]
+    best = study("recommend mug")
+    assert best["n"] == 7
+    shown = study("status mug")
+    assert (shown["complete"], shown["failed"], shown["running"]) == (7, 1, 1)
+    assert shown["pending"][0]["parameters"] == preview["parameters"]
+    exported = study("export mug")
+    assert exported["recommendation"]["trial"] == best["trial"]
+    assert len(exported["trials"]) == 9
+    assert run(["study", "export", "mug", "--out", "trials.csv"]) == 0
+    lines = (here / "trials.csv").read_text().splitlines()
+    assert lines[0].startswith("id,state,value,dx,dy,reached_dx,reached_dy")
+    assert len(lines) == 10
+
+
+def test_people_by_commands(study):
+    study(CREATE)
+    study("ask mug")
+    assert study("veto mug 0 --reason table")["state"] == "vetoed"
+    assert study("add mug --at dx=0.01,dy=0 0.8")["id"] == 1
+    study("pause mug --reason lunch")
+    assert study("ask mug", code=1) == {"id": None, "state": "paused", "reason": study("ask mug", code=1)["reason"]}
+    study("resume mug")
+    assert study("stop mug --trials 3")["stopped"] is False
+    study("ask mug")
+    assert study("ask mug", code=1)["state"] == "stopped"
+    assert study("status mug")["state"] == "stopped"
+    assert study("stop mug --hours 1 --improvement 0.01 --asks 2")["stop_rule"]["asks"] == 2
+    assert study("stop mug")["stop_rule"]["trials"] is None
+    assert study("ask mug")["id"] == 3
+
+
+def test_plain_answers_are_for_people(capsys):
+    for line in (CREATE, "ask mug", "tell mug 0 0.5", "status mug", "next mug", "recommend mug", "pause mug"):
+        assert run(["study", *line.split()]) == 0
+    out = capsys.readouterr().out
+    assert "trial 0\n  dx = " in out
+    assert " m\n" in out
+    assert "study mug in runs/mug/journal.log: open" in out
+    assert "expect" in out
+
+
+def test_parameters_of_every_kind(study):
+    text = "f=0.1:100:log,n=1:9:int:step=2,k=1:1000:int:log,t=0:1:step=0.25,grip=pinch|power"
+    made = study(f"create all --parameters {text} --noise none")
+    assert made["parameters"]["k"]["attributes"]["log"] is True
+    parameters = study("ask all")["parameters"]
+    assert parameters["n"] in (1, 3, 5, 7, 9)
+    assert parameters["grip"] in ("pinch", "power")
+    study("tell all 0 1.5 --reached grip=power,f=0.5")
+    study("add all --at f=1,n=3,k=10,t=0.5,grip=pinch 2")
+    assert study("recommend all")["n"] == 2
+
+
+def test_a_worker_by_command(study, capsys):
+    study("create hill --parameters x=0:1,y=0:1 --problem own.py:hill --initial 5")
+    study("stop hill --trials 8")
+    assert run(["study", "work", "hill", "--trials", "3"]) == 0
+    assert run(["study", "work", "hill"]) == 0
+    assert study("status hill")["complete"] == 8
+    study("create named --parameters n=1:5:int,grip=pinch|power --noise none --initial 4")
+    assert run(["study", "work", "named", "--function", "own.py:by_name", "--trials", "6"]) == 0
+    assert study("recommend named")["parameters"]["grip"] == "pinch"
+    study("create r --problem rkhs --initial 3")
+    assert run(["study", "work", "r", "--trials", "3"]) == 0
+    assert "Done: 3 trials" in capsys.readouterr().out
+
+
+def test_warm_start_from_a_file_and_from_a_study(study, here):
+    study(CREATE)
+    (here / "rig.csv").write_text("x [m],dy,quality,state\n0.01,0.0,0.9,ok\n-0.02,0.01,,\n0.03,0.01,0.2,running\n")
+    columns = '--columns "dx=x [m]"'
+    assert run(["study", "import", "mug", "rig.csv", "--columns", "dx=x [m]", "--value", "quality"]) == 0, columns
+    shown = study("status mug")
+    assert (shown["complete"], shown["failed"]) == (1, 1)
+    (here / "bad.csv").write_text("dx,dy,value\n0.01,0.0,0.9\n0.5,0.0,0.9\n")
+    assert "bad.csv, line 3: parameters: dx = 0.5 lies outside" in study("import mug bad.csv", code=2)
+    assert study("status mug")["trials"] == 2
+    found = study("import mug bad.csv --skip-bad")
+    assert found["imported"] == 1
+    assert len(found["left_out"]) == 1
+    study("create other --parameters u=-0.05:0.05,dy=-0.03:0.03 --noise none --storage sqlite:///other.db")
+    assert study("import other --study mug --columns u=dx --storage sqlite:///other.db")["imported"] == 3
+    exported = study("export other --storage sqlite:///other.db")["trials"]
+    assert [t["value"] for t in exported] == [0.9, None, 0.9]
+    assert exported[0]["note"] == "from mug, trial 0"
+    again = here / "again.csv"
+    assert run(["study", "export", "mug", "--out", str(again)]) == 0
+    study("create third --parameters dx=-0.05:0.05,dy=-0.03:0.03")
+    assert study("import third again.csv")["imported"] == 3
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("ask gone", "does not exist"),
+        ("ask ../mug", "study name"),
+        ("ask cup --storage runs/mug", "there are mug"),
+        ("create mug --parameters dx=0:1", "exists in"),
+        ("create a", "--parameters are missing"),
+        ("create a --parameters dx=1:0", "smaller"),
+        ("create a --parameters dx=0", "not understood"),
+        ("create a --parameters dx=0:1:cubic", "none of log, int"),
+        ("create a --parameters dx=0:1,dx=0:2", "named twice"),
+        ("create a --parameters dx=0:1:log", "not understood"),
+        ("create a --parameters dx=0.5:3:int", "not understood"),
+        ("create a --parameters dx=0:inf", "not understood|finite"),
+        ("create a --parameters dx=0:1 --noise dy=0.1", "'dy' is unknown"),
+        ("create a --parameters dx=0:1 --units dz=m", "'dz'"),
+        ("create a --parameters dx=0:1 --criterion good", "criterion"),
+        ("create a --parameters dx=0:1 --seed -1", "seed"),
+        ("create a --parameters dx=0:1 --initial 0", "n_initial"),
+        ("create a --problem rkh", "did you mean 'rkhs'"),
+        ("create a --parameters x=0:1 --problem own.py:hil", "did you mean 'hill'"),
+        ("create a --parameters dx=0:1 --storage mysql://x/y", "of no kind that is known"),
+        ("create a --parameters dx=0:1 --storage own.py", "is no journal"),
+        ("tell mug 0", "has no value"),
+        ("tell mug 0 nan", "finite"),
+        ("tell mug 0 inf", "finite"),
+        ("tell mug 0 good", "finite"),
+        ("tell mug 0 1 --failed", "leave one of the two out"),
+        ("tell mug 1 1", "trial 1 is not in study 'mug'; the last one is 0"),
+        ("tell mug zero 1", "valid integer"),
+        ("tell mug -1 1", "0 or more"),
+        ("tell mug 0 1 --reachd dx=0", "reachd"),
+        ("tell mug 0 1 --reached dx=9", "outside its range"),
+        ("tell mug 0 1 --reached dz=0", "'dz' is unknown"),
+        ("tell mug 0 1 --reached dx", "not of the form"),
+        ("veto mug 5", "not in study"),
+        ("add mug --at dx=0 1", "say nothing about dy"),
+        ("add mug --at dx=0,dy=0", "has no value"),
+        ("stop mug --trials 0", "budget"),
+        ("stop mug --improvement nan", "improvement"),
+        ("import mug", "give either"),
+        ("import mug gone.csv", "cannot be read"),
+        ("import mug own.py", "has no column"),
+        ("import mug --study gone", "does not exist"),
+        ("recommend mug", "no trial has given a value yet"),
+        ("work mug", "says nothing about what its trials are"),
+        ("serve mug --token short", "16 printable"),
+        ("serve mug --port 70000", "65535"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(line, message, capsys):
+    import re
+
+    assert run(["study", *CREATE.split()]) == 0
+    assert run(["study", "ask", "mug"]) == 0
+    capsys.readouterr()
+    assert run(["study", *line.split()]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: ")
+    assert error.count("\n") == 1
+    assert re.search(message, error), error
+    assert run(["study", "tell", "mug", "0", "1"]) == 0, "something was lost"
+
+
+def test_negative_numbers_and_ids(study):
+    study(CREATE)
+    study("ask mug")
+    study("tell mug 0 -1.5")
+    study("add mug --at dx=-0.01,dy=-0.01 -2.5e-3")
+    assert study("status mug")["highest_value"] == -2.5e-3
+
+
+def test_a_process_of_its_own(here):
+    """As another language would call it."""
+    command = [sys.executable, "-m", "surehold", "study"]
+    for line in (CREATE, "ask mug --json"):
+        done = subprocess.run([*command, *line.split()], capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr == ""
+    assert json.loads(done.stdout)["id"] == 0
