@@ -8,6 +8,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.campaigns.plan import ProblemSetup
+from surehold.campaigns.plan_file import load_plan
+from surehold.campaigns.problem_setup import SimoxGrasp, build_problem
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.presets import TreedSettings, thesis_preset
 from surehold.optimization.quadratures import sigma_points
@@ -138,14 +141,13 @@ def _unscented_posterior() -> Picture:
 
 
 def _metric() -> Picture:
-    from surehold.problems.grasp import Grasp
-
     unit = np.linspace(0.1, 0.25, 241)
     lines = []
     for contact, label, color in (("single", "one contact a link (thesis)", _INK), ("graded", "soft touch", _BLUE)):
-        problem = Grasp("bottle", variables=("dx",), contact=contact)
+        grasp = {"object": "bottle", "variables": ("dx",), "contact": contact, "closing": "synergy", "quality": "simox"}
+        problem = build_problem(ProblemSetup("grasp", 1, 1, grasp))
         lines.append(Line(unit, _values(problem, problem.box.from_unit(unit[:, None])), label, color))
-    panel = Panel("Bottle, right-front", "dx, as a share of its range", "grasp quality (epsilon)", tuple(lines))
+    panel = Panel("Bottle, right-front", "dx, as a share of its range", "grasp quality (simox)", tuple(lines))
     return Picture(
         "figure-4.7",
         "Figure 4.7: profile of the grasp quality of the water bottle along dx",
@@ -162,23 +164,27 @@ def grasp_scenes(answers: dict[str, tuple[list[float], list[float]]] | None = No
     answers
         By label, the input (2,) in the unit cube, and the one of its worst re-query.
     """
-    from surehold.problems.grasp import Grasp
-
+    problems = load_plan("table-4.4-grasps").problems
     scenes = {}
     for obj in ("bottle", "mug", "glass", "drill"):
-        problem = Grasp(obj, contact="single")
-        center = problem.box.from_unit(np.full(problem.box.dimension, 0.5))
+        problem = _grasp_of(problems[obj])
+        center = problem.base.box.from_unit(np.full(problem.box.dimension, 0.5))
         figure = "4.2, 4.3" if obj == "glass" else "4.2"
-        scenes[f"Figure {figure}: {obj}"] = gather.grasp_scene(
-            problem.simulator.scene(problem.grasp(center), opened=True)
-        )
+        opened = problem.base.simulator.scene(problem.base.grasp(center), opened=True)
+        scenes[f"Figure {figure}: {obj}"] = gather.grasp_scene(opened)
+    problem = _grasp_of(problems["bottle"])
     for label, (u, shaken) in (answers or {}).items():
-        problem = Grasp("bottle", contact="single")
         for word, place in (("", u), (", worst re-query", shaken)):
-            outcome = problem.grasp(problem.box.from_unit(np.array(place)))
-            name = f"Figure 4.16: {label}{word}, {outcome.quality:.3f}"
-            scenes[name] = gather.grasp_scene(problem.simulator.scene(outcome))
+            x = problem.box.from_unit(np.array(place))
+            name = f"Figure 4.16: {label}{word}, {float(np.asarray(problem(x))):.3f}"
+            scenes[name] = gather.grasp_scene(problem.base.simulator.scene(problem.base.grasp(x)))
     return scenes
+
+
+def _grasp_of(on: ProblemSetup) -> SimoxGrasp:
+    problem = build_problem(on)
+    assert isinstance(problem, SimoxGrasp)
+    return problem
 
 
 def _conditioned(X: NDArray[np.float64], surrogate: str) -> Posterior:

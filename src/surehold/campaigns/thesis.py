@@ -188,13 +188,14 @@ OPEN_PLACES: Final = (
     OpenPlace(
         "Grasp quality and objects",
         "Simox' normalized measure on Simox' own meshes; mug and drill are not public.",
-        "The textbook measure (largest ball about the origin) on objects of the same kind and size: levels compare "
-        "with the published ones only roughly, methods with each other fully.",
+        "The same measure, its slips included, on objects of the same kind and size; one contact a link, fingers that "
+        "follow the synergy until they touch. Levels compare roughly, methods with each other fully.",
     ),
     OpenPlace(
         "Facets and thumb of the grasps",
-        '"One of the sideways facets", and the top of the bottle.',
-        "right-front, and top-right for the top.",
+        '"One of the sideways facets", the one with the handle for the mug, and the top of the bottle.',
+        "right-front for bottle and glass, top-right for the bottle's top, back-right for the mug (its handle is "
+        "there), front-right for the drill.",
     ),
     OpenPlace(
         "Local search of the criterion",
