@@ -231,3 +231,60 @@ def test_a_process_of_its_own(here):
         assert done.returncode == 0, done.stderr
         assert done.stderr == ""
     assert json.loads(done.stdout)["id"] == 0
+
+
+OWN_RUN = "maximize own.py:hill --bounds x=0:1,y=0:1 --initial 5 --study hill"
+
+
+def test_a_run_is_kept_and_resumed(study, here, capsys):
+    assert run([*OWN_RUN.split(), "--trials", "7"]) == 0
+    assert (here / "runs" / "hill" / "report.html").exists()
+    assert study("status hill")["complete"] == 7
+    assert run([*OWN_RUN.split(), "--trials", "10"]) == 0
+    assert "Resuming study hill at trial 8" in capsys.readouterr().out
+    whole = "maximize own.py:hill --bounds x=0:1,y=0:1 --initial 5 --trials 10 --study whole --storage sqlite:///w.db"
+    assert run(whole.split()) == 0
+    values = [
+        [t["value"] for t in study(line)["trials"]] for line in ("export hill", "export whole --storage sqlite:///w.db")
+    ]
+    assert values[0] == values[1]
+    results = [json.loads((here / "runs" / name / "result.json").read_text()) for name in ("hill", "whole")]
+    assert results[0]["candidates"][-1]["x"] == results[1]["candidates"][-1]["x"]
+    assert study("stop hill --trials 11")["stopped"] is False
+    assert run(["study", "work", "hill"]) == 0
+    assert study("status hill")["complete"] == 11
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("--seed 1", "seed: 0 in the study, 1 now"),
+        ("--noise 0.1", "input noise"),
+        ("--method bo", "input noise: .* nothing now"),
+        ("--bounds x=0:2,y=0:1", "parameter x: 0:1 in the study, 0:2 now"),
+        ("--initial 6", "n_initial: 5 in the study, 6 now"),
+        ("--study ../hill", "study name"),
+    ],
+)
+def test_a_run_with_other_settings_is_refused(change, message, capsys):
+    import re
+
+    assert run([*OWN_RUN.split(), "--trials", "5"]) == 0
+    capsys.readouterr()
+    assert run([*OWN_RUN.split(), "--trials", "7", *change.split()]) == 2
+    assert re.search(message, capsys.readouterr().err)
+
+
+def test_a_storage_needs_a_study(capsys):
+    assert run(["maximize", "rkhs", "--trials", "3", "--initial", "3", "--storage", "a.log"]) == 2
+    assert "no --study" in capsys.readouterr().err
+
+
+def test_a_grasp_is_kept_and_worked_on(study):
+    line = "grasp mug --trials 4 --initial 4 --study mug"
+    assert run(line.split()) == 0
+    assert study("status mug")["complete"] == 4
+    study("stop mug --trials 6")
+    assert run(["study", "work", "mug"]) == 0
+    shown = study("status mug")
+    assert (shown["complete"] + shown["failed"], shown["units"]) == (6, {"dx": "m", "dy": "m"})

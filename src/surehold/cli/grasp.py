@@ -8,7 +8,20 @@ from typing import Annotated, Any
 
 import typer
 
-from surehold.cli.options import Initial, Method, Noise, Open, Out, Preset, Seed, Trials, checked_method, noise_of
+from surehold.cli.options import (
+    Initial,
+    Method,
+    Noise,
+    Open,
+    Out,
+    Preset,
+    Seed,
+    Study,
+    StudyStorage,
+    Trials,
+    checked_method,
+    noise_of,
+)
 
 __all__ = ["grasp"]
 
@@ -28,6 +41,8 @@ def grasp(
     seed: Seed = 0,
     preset: Preset = "",
     out: Out = "",
+    study: Study = "",
+    storage: StudyStorage = "",
     open_report: Open = False,
 ) -> None:
     """Find a grasp that still holds when the hand is off."""
@@ -35,17 +50,25 @@ def grasp(
     input_noise = noise_of(noise or "none", method)
 
     from surehold.cli.compilation import announced
-    from surehold.cli.session import folder_for, run_session
+    from surehold.cli.session import Kept, folder_for, run_session
     from surehold.cli.terminal import terminal
     from surehold.problems.grasp import Grasp
     from surehold.reports import gather
     from surehold.reports.run_report import Candidate, RunReport
 
-    console = terminal()
     names = tuple(name.strip() for name in variables.split(",") if name.strip())
+    described = {
+        "object": obj,
+        "facet": facet,
+        "variables": list(names),
+        "contact": contact,
+        "quality": quality,
+    }
+    kept = Kept(study, storage, {"grasp": described})
+    console = terminal()
     with announced(console):
         problem = Grasp(obj, facet, names, contact=contact, quality=quality)
-    folder = folder_for(f"{problem.object.name} {facet}", method, seed, out)
+    folder = folder_for(f"{problem.object.name} {facet}", method, seed, out, study)
 
     def describe(candidate: Candidate) -> Candidate:
         outcome = problem.grasp(candidate.x)
@@ -88,6 +111,7 @@ def grasp(
         units=dict(zip(problem.box.names, problem.units, strict=True)),
         quality_name=f"quality ({quality})",
         disturbance="the hand is off",
+        kept=kept,
         console=console,
     )
 

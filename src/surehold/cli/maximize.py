@@ -4,7 +4,20 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from surehold.cli.options import Initial, Method, Noise, Open, Out, Preset, Seed, Trials, checked_method, noise_of
+from surehold.cli.options import (
+    Initial,
+    Method,
+    Noise,
+    Open,
+    Out,
+    Preset,
+    Seed,
+    Study,
+    StudyStorage,
+    Trials,
+    checked_method,
+    noise_of,
+)
 
 __all__ = ["maximize"]
 
@@ -42,6 +55,8 @@ def maximize(
     seed: Seed = 0,
     preset: Preset = "",
     out: Out = "",
+    study: Study = "",
+    storage: StudyStorage = "",
     open_report: Open = False,
 ) -> None:
     """Find a maximum that still holds when the input is off."""
@@ -51,9 +66,10 @@ def maximize(
     noise_text = defaults.noise if noise is None else noise
     input_noise = noise_of(noise_text, method)
 
-    from surehold.cli.session import folder_for, run_session
+    from surehold.cli.session import Kept, folder_for, run_session
     from surehold.optimization.optimizer import Optimizer
 
+    kept = Kept(study, storage, {"function": problem} if ":" in problem else {"synthetic": problem})
     budget = defaults.trials if trials is None else trials
     start = initial
     if start is None:
@@ -67,9 +83,10 @@ def maximize(
         initial=start,
         seed=seed,
         preset=preset,
-        folder=folder_for(chosen.name, method, seed, out),
+        folder=folder_for(chosen.name, method, seed, out, study),
         open_report=open_report,
         settings={"problem": problem, "bounds": bounds or None, "input noise": noise_text},
+        kept=kept,
     )
 
 

@@ -16,6 +16,8 @@ __all__ = [
     "Out",
     "Preset",
     "Seed",
+    "Study",
+    "StudyStorage",
     "Trials",
     "checked_method",
     "noise_of",
@@ -33,6 +35,19 @@ Out = Annotated[
 ]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser at the end.")]
 Preset = Annotated[str, typer.Option(help="Settings by name, such as thesis.", show_default=False)]
+Study = Annotated[
+    str,
+    typer.Option(help="Keep the run as a study of this name, and resume it where it exists.", show_default=False),
+]
+StudyStorage = Annotated[
+    str,
+    typer.Option(
+        "--storage",
+        help="Of the study: a journal file, sqlite:///file.db or postgresql://user@host/database; by default "
+        "SUREHOLD_STORAGE, or runs/STUDY/journal.log.",
+        show_default=False,
+    ),
+]
 Trials = Annotated[int | None, typer.Option(help="Number of trials, the initial ones included.")]
 Initial = Annotated[int | None, typer.Option(help="Number of trials of the initial design.")]
 Noise = Annotated[

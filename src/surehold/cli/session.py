@@ -1,9 +1,12 @@
 """One run from the command line: progress while it goes, re-queries, the files, and the table at the end."""
 
+import os
 import re
 import time
 import webbrowser
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +17,7 @@ from rich.table import Table
 
 from surehold.cli.compilation import announced, warm_up
 from surehold.cli.terminal import terminal
-from surehold.errors import InputError
+from surehold.errors import InputError, SureholdError
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.maximization import Result, Trial, maximize
 from surehold.problems.perturbation import robust_score
@@ -23,13 +26,32 @@ from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.verdict import number, verdict
 
-__all__ = ["folder_for", "run_session"]
+__all__ = ["Kept", "folder_for", "run_session"]
 
 REQUERIES = 100  # perturbed re-queries of a candidate; they score and are no part of the budget
 
 
-def folder_for(name: str, method: str, seed: int, out: str) -> Path:
-    """Return the folder for a run's files, created and writable: `out`, or runs/NAME-METHOD-seedN."""
+@dataclass(frozen=True)
+class Kept:
+    """Where a run is kept as a study, and what workers on other machines need to know of it."""
+
+    study: str = ""
+    """name; empty for a run that is not kept"""
+    storage: str = ""
+    """URL, see `surehold.studies.storage`; empty for SUREHOLD_STORAGE, or the journal of the study"""
+    problem: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.storage and not self.study:
+            raise InputError(f"--storage {self.storage} is given, but no --study; name the study to keep there.")
+
+
+def folder_for(name: str, method: str, seed: int, out: str, study: str = "") -> Path:
+    """Return the folder for a run's files, created and writable: `out`, runs/STUDY, or runs/NAME-METHOD-seedN."""
+    if study and not out:
+        from surehold.studies.storage import checked_name
+
+        return files.checked_folder(Path("runs") / checked_name(study))
     slug = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "run"
     return files.checked_folder(out or Path("runs") / f"{slug}-{method}-seed{seed}")
 
@@ -52,9 +74,12 @@ def run_session(
     units: Mapping[str, str] | None = None,
     quality_name: str = "value",
     disturbance: str = "the input is off",
+    kept: Kept | None = None,
     console: Console | None = None,
 ) -> RunReport:
     """Maximize, score, write and show; Ctrl-C keeps what was done.
+
+    A run that is kept as a study is resumed where that exists.
 
     `describe` adds to a candidate what the problem knows of it; `also_write` writes further files.
 
@@ -87,7 +112,10 @@ def run_session(
     started = time.perf_counter()
     with announced(console):
         warm_up(problem, options)
-    result = _with_progress(problem, trials, options, console)
+    if kept is None or not kept.study:
+        result = _with_progress(problem, trials, options, console)
+    else:
+        result = _as_study(kept, problem, trials, options, units or {}, console)
     if result.interrupted:
         console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
     notes = _failures(result)
@@ -104,7 +132,14 @@ def run_session(
         result,
         candidates,
         title=title,
-        settings={**settings, "method": method, "trials": trials, "initial trials": initial, "preset": preset or None},
+        settings={
+            **settings,
+            "method": method,
+            "trials": trials,
+            "initial trials": initial,
+            "preset": preset or None,
+            "study": kept.study if kept and kept.study else None,
+        },
         noise=noise,
         units=units,
         quality_name=quality_name,
@@ -121,6 +156,68 @@ def run_session(
 
 
 def _with_progress(problem: Problem, trials: int, options: dict[str, Any], console: Console) -> Result:
+    with _progress(trials, options, console) as show:
+
+        def told(trial: Trial) -> None:
+            robust = None if trial.recommendation is None else trial.recommendation.mean
+            show(trial.index + 1, trial.best, robust)
+
+        return maximize(problem, problem.box, trials, callback=told, **options)
+
+
+def _as_study(
+    kept: Kept, problem: Problem, trials: int, options: dict[str, Any], units: Mapping[str, str], console: Console
+) -> Result:
+    """Make the trials that a stored study lacks."""
+    from optuna import logging
+
+    from surehold.studies.replay import result_of
+    from surehold.studies.robot import RobotStudy
+    from surehold.studies.search_space import SearchSpace
+    from surehold.studies.settings import StudySettings
+    from surehold.studies.stop_rule import StopRule
+    from surehold.studies.trial_function import trial_function
+    from surehold.studies.worker import work
+
+    logging.set_verbosity(logging.WARNING)
+    optimizer = {name: options[name] for name in ("seed", "n_initial", "preset") if options[name] is not None}
+    space = SearchSpace(problem.box)
+    settings = StudySettings(space, options["input_noise"], units, optimizer, kept.problem)
+    storage = kept.storage or os.environ.get("SUREHOLD_STORAGE", "")
+    study = RobotStudy.create(kept.study, settings, storage, resume=True)
+    if study.paused is not None:
+        raise InputError(f"study '{study.name}' is paused ({study.paused}); resume it with: surehold study resume.")
+    done = len(study.trials())
+    if done:
+        console.print(f"Resuming study {study.name} at trial {done + 1}.", markup=False)
+    study.set_stop_rule(StopRule(trials=trials))
+    interrupted = False
+    with _progress(trials, options, console) as show:
+
+        def told(*_: Any) -> None:
+            finished = [t for t in study.trials() if t.state.is_finished()]
+            values = [t.values[0] for t in finished if t.values]
+            modelled = values and len(finished) >= options["n_initial"]
+            robust = study.recommend(write=False).mean if modelled else None
+            show(len(finished), max(values, default=np.nan), robust)
+
+        try:
+            work(study, trial_function(problem, space), after=told)
+        except KeyboardInterrupt:
+            interrupted = True
+    if not any(t.values for t in study.trials()):
+        if interrupted:
+            raise KeyboardInterrupt
+        raise SureholdError(f"all {len(study.trials())} trials of study '{study.name}' failed.")
+    study.recommend()
+    return result_of(study, interrupted)
+
+
+@contextmanager
+def _progress(
+    trials: int, options: dict[str, Any], console: Console
+) -> Iterator[Callable[[int, float, float | None], None]]:
+    """Show progress; yields what is told (trials done, highest value, value of the recommendation)."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=None),
@@ -132,15 +229,16 @@ def _with_progress(problem: Problem, trials: int, options: dict[str, Any], conso
     with Progress(*columns, console=console, transient=not console.is_terminal) as progress:
         task = progress.add_task("initial design", total=trials, best="–", robust="")
 
-        def show(trial: Trial) -> None:
-            told = trial.recommendation
-            robust = "" if told is None or options["input_noise"] is None else f"recommended {number(told.mean)}"
-            phase = "initial design" if trial.index + 1 < options["n_initial"] else "optimizing"
-            progress.update(task, advance=1, description=phase, best=number(trial.best), robust=robust)
-            if not console.is_terminal and (trial.index + 1) % 10 == 0:
-                console.print(f"trial {trial.index + 1} of {trials}: highest {number(trial.best)} {robust}".rstrip())
+        def show(done: int, best: float, recommended: float | None) -> None:
+            robust = (
+                "" if recommended is None or options["input_noise"] is None else f"recommended {number(recommended)}"
+            )
+            phase = "initial design" if done < options["n_initial"] else "optimizing"
+            progress.update(task, completed=done, description=phase, best=number(best), robust=robust)
+            if not console.is_terminal and done % 10 == 0:
+                console.print(f"trial {done} of {trials}: highest {number(best)} {robust}".rstrip())
 
-        return maximize(problem, problem.box, trials, callback=show, **options)
+        yield show
 
 
 def _failures(result: Result) -> list[str]:

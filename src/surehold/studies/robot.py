@@ -18,7 +18,7 @@ from optuna.trial import FrozenTrial, TrialState
 from surehold.errors import InputError, SureholdError
 from surehold.studies.history import REACHED, history_of, parameters_of
 from surehold.studies.ledger import HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
-from surehold.studies.recommendation import StudyRecommendation, recommend
+from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend
 from surehold.studies.settings import SETTINGS, StudySettings
 from surehold.studies.stop_rule import StopRule
 from surehold.studies.storage import Storage, checked_name, open_storage
@@ -291,10 +291,10 @@ class RobotStudy:
 
     # --- looking --------------------------------------------------------------------------------------------------
 
-    def recommend(self) -> StudyRecommendation:
+    def recommend(self, *, write: bool = True) -> StudyRecommendation:
         """Return the safe answer, and write it into the study; see `surehold.studies.recommend`."""
         with self.storage.failures():
-            return recommend(self.study, self.sampler)
+            return (recommend if write else find_recommendation)(self.study, self.sampler)
 
     def trials(self) -> list[FrozenTrial]:
         """Return all trials as Optuna stores them, by number; not to be changed."""
