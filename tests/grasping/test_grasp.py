@@ -29,8 +29,9 @@ def test_each_status_and_its_quality(simulator):
     assert held.quality > 0.05
     assert {name.split()[0] for name in held.touching} >= {"thumb", "index", "middle", "ring"}
     inside = simulator.grasp(pose_of(simulator, dx=0.0), -0.7)
-    assert (inside.status, inside.quality, len(inside.contacts)) == ("initial collision", 0.0, 0)
+    assert (inside.status, len(inside.contacts)) == ("initial collision", 0)
     assert inside.penetration > 0.001
+    assert -0.05 < inside.quality < 0.0
     away = simulator.grasp(pose_of(simulator, standoff=0.4), -0.7)
     assert (away.status, away.quality, away.penetration) == ("no contact", 0.0, 0.0)
     loose = simulator.grasp(pose_of(simulator, standoff=0.062, dx=-0.07), -0.7)
@@ -42,7 +43,14 @@ def test_quality_is_the_wrench_measure_of_its_contacts(simulator):
     grasp = simulator.grasp(pose_of(simulator), -0.7)
     contacts, mug = grasp.contacts, simulator.object
     expected = wrench_quality(
-        contacts.points, contacts.normals, 0.5, 8, mug.torque_length, mug.center_of_mass, weights=contacts.weights
+        contacts.points,
+        contacts.normals,
+        0.5,
+        8,
+        mug.torque_length,
+        mug.center_of_mass,
+        weights=contacts.weights,
+        cones="round",
     )
     assert grasp.quality == expected.epsilon
     volume = Simulator(obj="bottle", quality="volume", contact="single")
@@ -75,10 +83,21 @@ def test_random_poses_give_finite_results_and_repeat(name):
         assert grasp.status in STATUSES
         assert np.isfinite(grasp.quality)
         assert (grasp.quality > 0.0) == (grasp.status == "ok")
+        assert (grasp.quality < 0.0) == (grasp.status == "initial collision")
         assert np.all(grasp.joints >= simulator.hand.lower - 1e-12)
         assert np.all(grasp.joints <= simulator.hand.upper + 1e-12)
         assert simulator.grasp(pose, s1).quality == grasp.quality
     assert len(seen) >= 2
+
+
+def test_a_collision_costs_more_the_deeper_it_is(simulator):
+    worth = [simulator.grasp(pose_of(simulator, dx=x), -0.7) for x in np.arange(-0.042, -0.034, 0.001)]
+    values = np.array([g.quality for g in worth if g.status == "initial collision"])
+    assert len(values) >= 4
+    assert np.all(np.diff(values) < 0.0)
+    assert values[0] > -0.02
+    plain = Simulator(obj="mug", collision="zero").grasp(pose_of(simulator, dx=0.0), -0.7)
+    assert (plain.status, plain.quality) == ("initial collision", 0.0)
 
 
 def test_scene_holds_watertight_bodies_in_the_world(simulator):
@@ -116,6 +135,13 @@ def test_scene_holds_watertight_bodies_in_the_world(simulator):
         ({"edges": True}, "edges"),
         ({"depth": 0.0}, "depth of the soft touch"),
         ({"depth": 0.1}, "depth of the soft touch"),
+        ({"torsion": 1.0}, "torsion is 1.0 m"),
+        ({"cones": "square"}, "polyhedral, round"),
+        ({"collision": "ignored"}, "penalty, zero"),
+        ({"convention": "unit"}, "normal_unit, unit_magnitude"),
+        ({"task": [[0, 0, 1, 0, 0, 0]]}, "ask for quality='task'"),
+        ({"task": [[0, 0, 1]], "quality": "task"}, "shape"),
+        ({"task": np.zeros((1, 6)), "quality": "task"}, "not zero"),
     ],
 )
 def test_bad_options_are_explained(options, words):

@@ -29,7 +29,8 @@ def test_value_is_the_quality_of_the_grasp(mug):
     grasp = mug.grasp(x)
     assert grasp.status == "ok"
     assert mug(x) == grasp.quality > 0.05
-    np.testing.assert_array_equal(mug([x, [0.0, 0.0]]), [grasp.quality, 0.0])
+    assert mug([0.0, 0.0]) < 0.0, "the open hand collides"
+    np.testing.assert_array_equal(mug([x, [0.0, 0.0]]), [grasp.quality, mug([0.0, 0.0])])
     pose = default_pose(mug.simulator.hand, mug.object, "right-front", mug.default.standoff, [*x, 0, 0, 0, 0])
     assert mug.simulator.grasp(pose, mug.default.s1).quality == grasp.quality
 
@@ -113,3 +114,13 @@ def test_bad_points_are_explained(mug):
         mug([0.0, float("nan")])
     with pytest.raises(InputError, match="one point"):
         mug.grasp([[0.0, 0.0], [0.01, 0.0]])
+
+
+def test_the_thesis_preset_is_the_original_experiment():
+    problem = Grasp("bottle", variables=("dx", "s1"), preset="thesis")
+    assert (problem.simulator.contact, problem.simulator.quality) == ("single", "simox")
+    assert (problem.simulator.closing, problem.simulator.collision) == ("synergy", "zero")
+    assert problem.box.upper[1] == pytest.approx(np.pi)
+    assert 0.1 < problem([-0.03, -0.7]) < 1.0
+    with pytest.raises(InputError, match="preset 'theses' is unknown"):
+        Grasp("bottle", preset="theses")

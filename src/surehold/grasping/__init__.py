@@ -8,18 +8,20 @@ if TYPE_CHECKING:
     from surehold.grasping.contacts import CONTACT_MODELS, Contacts
     from surehold.grasping.distance_field import DistanceField, distance_field_of
     from surehold.grasping.formats import GraspFile, StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
-    from surehold.grasping.friction_cones import contact_wrenches
-    from surehold.grasping.grasp import QUALITIES, STATUSES, Grasp, Simulator
+    from surehold.grasping.friction_cones import contact_wrenches, soft_finger_torsion
+    from surehold.grasping.grasp import COLLISIONS, STATUSES, Grasp, Simulator
     from surehold.grasping.hand import Hand, icub_left_hand
     from surehold.grasping.inscribed_ball import ball_radius
     from surehold.grasping.linear_programs import force_closure, gravity_wrenches, task_quality
     from surehold.grasping.meshes import OBJECTS, GraspObject, shipped_object
     from surehold.grasping.poses import FACETS, MODES, Pose, default_pose
+    from surehold.grasping.quality import QUALITIES
     from surehold.grasping.scene import Scene, SceneMesh, grasp_scene
     from surehold.grasping.simox import ObjectWrenchSpace, object_wrench_space, simox_quality
     from surehold.grasping.wrench_space import WrenchQuality, wrench_quality
 
 _HOMES = {
+    "COLLISIONS": "grasp",
     "CLOSING_MODES": "closing",
     "CONTACT_MODELS": "contacts",
     "Contacts": "contacts",
@@ -33,7 +35,7 @@ _HOMES = {
     "OBJECTS": "meshes",
     "ObjectWrenchSpace": "simox",
     "Pose": "poses",
-    "QUALITIES": "grasp",
+    "QUALITIES": "quality",
     "STATUSES": "grasp",
     "Scene": "scene",
     "SceneMesh": "scene",
@@ -53,6 +55,7 @@ _HOMES = {
     "read_isaac_grasps": "formats",
     "shipped_object": "meshes",
     "simox_quality": "simox",
+    "soft_finger_torsion": "friction_cones",
     "task_quality": "linear_programs",
     "wrench_quality": "wrench_space",
     "write_isaac_grasps": "formats",
@@ -60,6 +63,7 @@ _HOMES = {
 
 __all__ = [
     "CLOSING_MODES",
+    "COLLISIONS",
     "CONTACT_MODELS",
     "FACETS",
     "MODES",
@@ -92,6 +96,7 @@ __all__ = [
     "read_isaac_grasps",
     "shipped_object",
     "simox_quality",
+    "soft_finger_torsion",
     "task_quality",
     "wrench_quality",
     "write_isaac_grasps",

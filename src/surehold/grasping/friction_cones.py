@@ -20,7 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
 
-__all__ = ["CheckedContacts", "RoundContacts", "cone_edges", "contact_wrenches", "round_contacts", "tangents"]
+__all__ = [
+    "CheckedContacts",
+    "RoundContacts",
+    "cone_edges",
+    "contact_wrenches",
+    "round_contacts",
+    "soft_finger_torsion",
+    "tangents",
+]
 
 Convention = Literal["normal_unit", "unit_magnitude"]
 CONVENTIONS = ("normal_unit", "unit_magnitude")
@@ -167,6 +175,18 @@ def round_contacts(contacts: CheckedContacts) -> RoundContacts:
     axes[:, 3:, 2] = (gamma * scale)[:, None] * n
     force = scale[:, None] * n
     return RoundContacts(np.hstack((force, _cross(arms, force))), axes)
+
+
+def soft_finger_torsion(friction: float, radius: float) -> float:
+    """Return the torsional friction gamma [m] of a soft finger whose patch of contact has the given radius [m].
+
+    gamma = 3 pi / 16 friction radius: Coulomb friction under the pressure of Hertz, p ~ sqrt(1 - (r / radius)^2), on
+    the whole disk (Howe and Cutkosky 1996). Raises InputError if a number is negative or not finite.
+    """
+    for name, value in (("friction", friction), ("radius", radius)):
+        if not (np.isfinite(value) and value >= 0.0):
+            raise InputError(f"{name} of a soft finger is {value!r}; give a finite number of 0 or more.")
+    return 3.0 * np.pi / 16.0 * float(friction) * float(radius)
 
 
 def tangent_field(n: NDArray[np.float64]) -> NDArray[np.float64]:

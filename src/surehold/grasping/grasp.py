@@ -24,22 +24,36 @@ from surehold.grasping.distance_field import DistanceField, distance_field_of
 from surehold.grasping.hand import Hand, hand_named, link_name
 from surehold.grasping.meshes import GraspObject, shipped_object
 from surehold.grasping.poses import Pose
+from surehold.grasping.quality import Measure
 from surehold.grasping.synergy import CLOSED, ClosingMotion, power_grasp
-from surehold.grasping.wrench_space import WrenchQuality, wrench_quality
+from surehold.grasping.wrench_space import WrenchQuality
 
 if TYPE_CHECKING:
     from surehold.grasping.scene import Scene
 
-__all__ = ["QUALITIES", "STATUSES", "Grasp", "Simulator"]
+__all__ = ["COLLISIONS", "STATUSES", "THESIS", "Grasp", "Simulator"]
 
 Array = NDArray[np.float64]
 Status = Literal["ok", "no contact", "initial collision", "not closed"]
 
-QUALITIES: Final = ("epsilon", "volume")
 #: What became of a trial. "ok": force closure. "no contact": fewer than two contacts. "initial collision": the open
-#: hand is inside the object. "not closed": contacts that do not resist every wrench. All but "ok" have quality 0.
+#: hand is inside the object. "not closed": contacts that do not resist every wrench.
 STATUSES: Final = ("ok", "no contact", "initial collision", "not closed")
 
+#: Worth of a hand that collides while it is open: a penalty that grows with the penetration, or 0.
+COLLISIONS: Final = ("penalty", "zero")
+
+#: Settings of the simulator behind the thesis.
+THESIS: Final = {
+    "contact": "single",
+    "quality": "simox",
+    "closing": "synergy",
+    "cones": "polyhedral",
+    "collision": "zero",
+}
+
+_PENALTY: Final = 0.05  # at the deepest penetration: half of a good epsilon
+_PENALTY_DEPTH: Final = 0.02  # depths of all bodies together at which the penalty is 63 % of that [m]
 _LEAST_SHARE: Final = 1e-3  # outcomes of a smaller share are not looked at
 _NO_CONTACTS: Final = as_contacts(np.empty((0, 8)))
 
@@ -49,7 +63,7 @@ class Grasp:
     """Outcome of one trial. Points and normals are in the frame of the object."""
 
     status: Status  #: see `STATUSES`
-    quality: float  #: the measure that was asked for; 0 unless the status is "ok"
+    quality: float  #: the measure that was asked for; 0 without two contacts; a collision's is 0 or below
     pose: Pose  #: from the palm frame to the object's frame
     s1: float  #: posture variable [rad]
     joints: Array = field(
@@ -82,15 +96,29 @@ class Simulator:
     contact
         "graded" (soft touch, continuous), "patch" or "single" (one for each touching link).
     quality
-        "epsilon" (radius of the largest ball about the origin in the hull of the wrenches) or "volume" (of that hull).
+        One of `QUALITIES`, explained in quality.py: "epsilon" (radius of the largest ball about the origin in the hull
+        of the wrenches), "signed_epsilon", "volume", "simox", "task" or "closure".
     closing
         "adaptive" (links beyond a touching one go on) or "synergy" (a touch stops the whole finger).
     friction
         Coefficient of friction; the object's own if not given.
+    torsion
+        Torsional friction of soft fingers: largest moment about the normal by normal force [m], see
+        `soft_finger_torsion`; 0 for hard points.
+    cones
+        "round" or "polyhedral", with `edges` edges.
     edges
-        Edges of the friction cone.
+        Edges of polyhedral friction cones; also of the cones that "volume", "task" and "closure" measure.
+    convention
+        "normal_unit" (forces with unit normal component) or "unit_magnitude".
+    task
+        For the quality "task": external forces [N] and torques about the center of mass [N m], (k, 6), each as large
+        as it weighs; gravity in 14 directions if not given.
     depth
         Depth of the soft touch [m].
+    collision
+        Worth of a hand that is inside the object while it is open: "penalty", below 0 and falling with the depth of
+        the penetration (after Castanheira et al. 2018), or "zero".
     object_pose
         From the object's frame to the world in which `grasp` takes poses; if not given, the world is that frame.
 
@@ -115,14 +143,19 @@ class Simulator:
         quality: str = "epsilon",
         closing: str = "adaptive",
         friction: float | None = None,
+        torsion: float = 0.0,
+        cones: Literal["polyhedral", "round"] = "round",
         edges: int = 8,
+        convention: Literal["normal_unit", "unit_magnitude"] = "normal_unit",
+        task: ArrayLike | None = None,
         depth: float = DEPTH,
+        collision: str = "penalty",
         object_pose: Pose | None = None,
     ):
         if contact not in CONTACT_MODELS:
             raise unknown_name("contact model", contact, CONTACT_MODELS)
-        if quality not in QUALITIES:
-            raise unknown_name("quality measure", quality, QUALITIES)
+        if collision not in COLLISIONS:
+            raise unknown_name("worth of a collision", collision, COLLISIONS)
         if closing not in CLOSING_MODES:
             raise unknown_name("closing", closing, CLOSING_MODES)
         self.hand: Final[Hand] = hand_named(hand) if isinstance(hand, str) else hand
@@ -130,12 +163,11 @@ class Simulator:
         self.contact: Final = contact
         self.quality: Final = quality
         self.closing: Final = closing
+        self.collision: Final = collision
         self.friction: Final[float] = self.object.friction if friction is None else float(friction)
-        if not (np.isfinite(self.friction) and self.friction >= 0.0):
-            raise InputError(f"friction is {friction!r}; give a number of 0 or more, such as 0.5.")
-        if isinstance(edges, bool) or not isinstance(edges, int | np.integer) or edges < 3:
-            raise InputError(f"edges of the friction cone are {edges!r}; give an integer of 3 or more, such as 8.")
-        self.edges: Final[int] = int(edges)
+        self.measure: Final = Measure(
+            quality, self.object, self.friction, float(torsion), edges, cones, convention, task
+        )
         if not 0.0 < depth <= 0.005:
             raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.005 m.")
         self.depth: Final[float] = float(depth)
@@ -158,29 +190,20 @@ class Simulator:
         motion = power_grasp(self.hand, float(s1))
         geometry = self._place(relative)
         opened = motion.joints(0.0)
-        gaps = self.gaps(relative, opened, geometry)
-        penetration = max(0.0, -float(gaps.min()))
+        depths = np.maximum(-self.gaps(relative, opened, geometry), 0.0)
+        penetration = float(depths.max())
         if penetration > 0.0:
-            return Grasp("initial collision", 0.0, relative, s1, opened, opened, _NO_CONTACTS, (), penetration)
+            worth = self._collision(float(depths.sum()))
+            return Grasp("initial collision", worth, relative, s1, opened, opened, _NO_CONTACTS, (), penetration)
         closed = self._close(geometry, motion)
-        joints, touched = closed.joints, closed.touched
         contacts = self._contacts(geometry, motion, closed)
-        touching = tuple(link_name(int(body)) for body in np.flatnonzero(touched))
+        touching = tuple(link_name(int(body)) for body in np.flatnonzero(closed.touched))
         if len(contacts) < 2:
-            return Grasp("no contact", 0.0, relative, s1, joints, opened, contacts, touching, 0.0)
-        wrench = wrench_quality(
-            contacts.points,
-            contacts.normals,
-            friction=self.friction,
-            edges=self.edges,
-            torque_length=self.object.torque_length,
-            origin=self.object.center_of_mass,
-            weights=contacts.weights,
-        )
-        if not wrench.force_closure:
-            return Grasp("not closed", 0.0, relative, s1, joints, opened, contacts, touching, 0.0, wrench)
-        value = wrench.epsilon if self.quality == "epsilon" else wrench.volume
-        return Grasp("ok", float(value), relative, s1, joints, opened, contacts, touching, 0.0, wrench)
+            return Grasp("no contact", 0.0, relative, s1, closed.joints, opened, contacts, touching, 0.0)
+        wrench = self.measure.wrench(contacts)
+        status: Status = "ok" if wrench.force_closure else "not closed"
+        worth = float(self.measure.value(contacts, wrench))
+        return Grasp(status, worth, relative, s1, closed.joints, opened, contacts, touching, 0.0, wrench)
 
     def gaps(self, pose: Pose, joints: ArrayLike, geometry: _Geometry | None = None) -> Array:
         """Return the gaps (21,) between the object and the hand's bodies at rest [m], the palm last.
@@ -220,13 +243,17 @@ class Simulator:
         self._skin(geometry, closed.joints)
         self._touch(geometry, closed)
         points = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
-        wrench_quality(points, -points, weights=np.ones(4))
+        self.measure.wrench(Contacts(points, -points, np.ones(4), np.arange(4)))
 
     def scene(self, grasp: Grasp, opened: bool = False) -> "Scene":
         """Return the meshes and contacts of a grasp in the world; with `opened`, of the hand before it closes."""
         from surehold.grasping.scene import grasp_scene  # pictures stand on grasps, not the other way round
 
         return grasp_scene(self, grasp, opened)
+
+    def _collision(self, depth: float) -> float:
+        """Return the worth of an open hand whose bodies are inside the object by `depth` together [m]."""
+        return _PENALTY * np.expm1(-depth / _PENALTY_DEPTH) if self.collision == "penalty" else 0.0
 
     def _place(self, pose: Pose) -> _Geometry:
         r, p = pose.rotation, np.asarray(pose.position)

@@ -70,15 +70,18 @@ def task_quality(wrenches: ArrayLike, task: ArrayLike) -> float:
         if not len(w):
             return 0.0
         # variables x (m), scale; maximize the scale
-        found = linprog(
-            np.append(np.zeros(len(w)), -1.0),
-            A_ub=np.append(np.ones(len(w)), 0.0)[None, :],
-            b_ub=[1.0],
-            A_eq=np.column_stack((w.T, t / size)),
-            b_eq=np.zeros(6),
-            bounds=(0.0, None),
-            method="highs",
-        )
+        for method in ("highs", "highs-ipm"):  # the second is the fallback; a failure is never scored as 0
+            found = linprog(
+                np.append(np.zeros(len(w)), -1.0),
+                A_ub=np.append(np.ones(len(w)), 0.0)[None, :],
+                b_ub=[1.0],
+                A_eq=np.column_stack((w.T, t / size)),
+                b_eq=np.zeros(6),
+                bounds=(0.0, None),
+                method=method,
+            )
+            if found.x is not None:
+                break
         if found.x is None:
             raise ArithmeticError(f"the linear program of the task wrench {t} failed: {found.message}")
         scale = min(scale, float(found.x[-1]) / size)

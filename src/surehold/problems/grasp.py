@@ -11,17 +11,17 @@ from the box center within h/3 and h/3 + 40 mm (1 + h / 50 mm), turns within ±4
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
+from surehold.grasping.grasp import THESIS, Simulator
 from surehold.grasping.grasp import Grasp as GraspOutcome
-from surehold.grasping.grasp import Simulator
 from surehold.grasping.meshes import GraspObject, shipped_object
 from surehold.grasping.poses import Pose, default_pose, facet_axes
-from surehold.grasping.synergy import S1_USEFUL
+from surehold.grasping.synergy import S1_RANGE, S1_USEFUL
 from surehold.optimization.box import Box
 from surehold.problems.grasp_defaults import GraspDefault, grasp_default
 from surehold.problems.problem import checked_points
@@ -52,8 +52,11 @@ class Grasp:
         facet against which the thumb comes to press, such as "right-front".
     variables
         Names of the free variables, a subset of `VARIABLES`; their order is the order of the coordinates.
-    contact, quality, closing, friction, hand
+    contact, quality, closing, friction, torsion, cones, task, collision, hand
         As in `surehold.grasping.Simulator`.
+    preset
+        "thesis": single contacts, the quality "simox", closing "synergy", polyhedral cones, collisions worth 0, and s1
+        within ±pi, whatever is said of them; "" for none.
     bounds
         `{name: (lower, upper)}` in m and rad for free variables that shall not have the bounds given above.
     fixed
@@ -83,6 +86,11 @@ class Grasp:
         quality: str = "epsilon",
         closing: str = "adaptive",
         friction: float | None = None,
+        torsion: float = 0.0,
+        cones: Literal["polyhedral", "round"] = "round",
+        task: ArrayLike | None = None,
+        collision: str = "penalty",
+        preset: str = "",
         hand: str = "icub-left",
         bounds: Mapping[str, tuple[float, float]] | None = None,
         fixed: Mapping[str, float] | None = None,
@@ -111,8 +119,17 @@ class Grasp:
             "quality": quality,
             "closing": closing,
             "friction": friction,
+            "torsion": torsion,
+            "cones": cones,
+            "task": task,
+            "collision": collision,
             "hand": hand,
         }
+        if preset not in ("", "thesis"):
+            raise unknown_name("preset", preset, ["thesis"])
+        if preset:
+            self._settings |= THESIS
+        self._s1_range = S1_RANGE if preset else S1_USEFUL
         self._simulator: Simulator | None = None
         self._simulator = self._build()
         self.default: Final[GraspDefault] = grasp_default(self.simulator, facet)
@@ -171,7 +188,7 @@ class Grasp:
             "rx": (-quarter, quarter),
             "ry": (-quarter, quarter),
             "rz": (-quarter, quarter),
-            "s1": S1_USEFUL,
+            "s1": self._s1_range,
         }
 
     def _build(self) -> Simulator:

@@ -1,0 +1,52 @@
+"""Trials that a collision penalty saves: `python -m benchmarks.grasp_collision [object ...]`.
+
+The same optimization, seed by seed, with a hand that collides while open worth 0 or worth a penalty that grows with
+the penetration. Robust optimization (input noise 0.03) over dx, dy, dz from a Latin hypercube of 20 trials. At several
+numbers of trials the recommended input is scored by 200 re-queries under the noise, with collisions worth 0 for both:
+means over the seeds with standard errors, the paired difference, and the share of the trials that collided.
+"""
+
+import sys
+
+import numpy as np
+
+import surehold as sh
+from surehold.optimization.threads import single_threaded
+
+SEEDS, INITIAL, CHECKS = 12, 20, (30, 45, 60, 80)
+VARIABLES = ("dx", "dy", "dz")
+
+
+def worth(problem, x, noise):
+    return sh.problems.robust_score(problem, x, noise, n=200, seed=12345).mean
+
+
+def run(name, collision, seed, noise, ruler):
+    problem = sh.problems.Grasp(name, variables=VARIABLES, collision=collision)
+    optimizer = sh.Optimizer(problem.box, input_noise=noise, n_initial=INITIAL, seed=seed)
+    scores, collided = [], 0
+    for n in range(1, CHECKS[-1] + 1):
+        x = optimizer.ask()
+        grasp = problem.grasp(x)
+        collided += grasp.status == "initial collision"
+        optimizer.tell(x, grasp.quality)
+        if n in CHECKS:
+            scores.append(worth(ruler, optimizer.recommend().x, noise))
+    return [*scores, collided / CHECKS[-1]]
+
+
+def main(names):
+    noise = sh.InputNoise.unit(0.03)
+    for name in names:
+        ruler = sh.problems.Grasp(name, variables=VARIABLES, collision="zero")
+        rows = {c: np.array([run(name, c, seed, noise, ruler) for seed in range(SEEDS)]) for c in ("zero", "penalty")}
+        rows["penalty - zero"] = rows["penalty"] - rows["zero"]
+        for label, table in rows.items():
+            error = table.std(axis=0, ddof=1) / np.sqrt(SEEDS)
+            cells = [f"{n}: {m:.4f} ({e:.4f})" for n, m, e in zip(CHECKS, table.mean(axis=0), error, strict=False)]
+            print(f"{name:8} {label:15} {'  '.join(cells)}  collided {table[:, -1].mean():.3f}", flush=True)
+
+
+if __name__ == "__main__":
+    with single_threaded():
+        main(sys.argv[1:] or ("mug", "bottle"))
