@@ -116,3 +116,20 @@ def test_variables_without_noise_get_no_points(name):
 def test_bad_arguments(build, words):
     with pytest.raises(InputError, match=words):
         build()
+
+
+@pytest.mark.parametrize("name", ["gauss_hermite", "quasi_monte_carlo"])
+def test_bounded_noise_against_an_integral_over_the_rectangle(name):
+    from scipy.integrate import dblquad
+
+    half = np.array([0.3, 0.1])
+    points, weights = quadrature(name, np.diag(half**2 / 3.0), bounded=True, exponent=9)
+    assert np.all(np.abs(points) <= half + 1e-12)
+    np.testing.assert_allclose(weights @ points, 0.0, atol=1e-12)
+    np.testing.assert_allclose((weights * points.T) @ points, np.diag(half**2 / 3.0), atol=1e-4)
+
+    def f(x, y):
+        return np.cos(3.0 * x + 1.0) * np.exp(y)
+
+    expected = dblquad(lambda y, x: f(x, y), -half[0], half[0], -half[1], half[1])[0] / (4.0 * half.prod())
+    assert weights @ f(*points.T) == pytest.approx(expected, rel=1e-3)

@@ -2,7 +2,11 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
+from surehold.optimization.box import Box
 from surehold.optimization.gaussian_process import GaussianProcess
+from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.maximization import maximize
+from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.quadratures import gauss_hermite, sigma_points
 from surehold.optimization.robustness import BORDERS, Perturbations
 
@@ -68,3 +72,35 @@ def test_average_of_the_model_by_plain_sampling(posterior):
 def test_unknown_border():
     with pytest.raises(InputError, match="extend"):
         Perturbations(sigma_points(S), "bounce")
+
+
+def test_perturbations_of_noise_that_varies_follow_it():
+    box = Box({"a": (0.0, 2.0), "b": (0.0, 1.0)})
+    noise = InputNoise.varying(lambda x: [0.1 + 0.1 * x[0], 0.0])
+    perturbations = Perturbations.of(noise, box, "unscented")
+    around = perturbations.around(np.array([[0.0, 0.5], [1.0, 0.5]]))
+    np.testing.assert_allclose(around[0, :, 0], [0.0, 0.05 * 2**0.5, -0.05 * 2**0.5], atol=1e-12)
+    np.testing.assert_allclose(around[1, :, 0], [1.0, 1.0 + 0.15 * 2**0.5, 1.0 - 0.15 * 2**0.5], atol=1e-12)
+    np.testing.assert_allclose(around[:, :, 1], 0.5)
+
+
+@pytest.mark.parametrize("noise", ["uniform", "varying"])
+def test_the_safe_hill_is_found_under_other_kinds_of_noise(noise):
+    """A spike at 0.2 and a hill at 0.7; where the noise is small, the spike is worth its height."""
+
+    def f(x):
+        return float(1.5 * np.exp(-0.5 * ((x[0] - 0.2) / 0.01) ** 2) + np.exp(-0.5 * ((x[0] - 0.7) / 0.1) ** 2))
+
+    box = Box({"x": (0.0, 1.0)})
+    kinds = {
+        "uniform": InputNoise.uniform({"x": 0.06}),
+        "varying": InputNoise.varying(lambda x: {"x": 1e-4 if x[0] < 0.5 else 0.05}),
+    }
+    result = maximize(f, box, n_trials=45, input_noise=kinds[noise], seed=0)
+    wanted = {"uniform": 0.7, "varying": 0.2}[noise]
+    assert result.recommendation.x[0] == pytest.approx(wanted, abs=0.03)
+
+
+def test_noise_larger_than_the_box_is_warned_of():
+    with pytest.warns(UserWarning, match="standard deviation of 3, 0.6 times the box"):
+        Optimizer(Box({"dx": (0.0, 5.0)}), input_noise=InputNoise({"dx": 3.0}))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import unknown_name
+from surehold.optimization.ascent import by_differences
 from surehold.optimization.criteria import (
     Value,
     expected_improvement,
@@ -94,6 +95,8 @@ class Acquisition:
 
     def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the values (q,) and their gradients (q, d) at points U (q, d)."""
+        if self._perturbations.root is not None:  # of noise that varies, by a user's function without a derivative
+            return by_differences(self, U)
         return self._evaluate(U, True)
 
     def _evaluate(self, U: NDArray[np.float64], gradient: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

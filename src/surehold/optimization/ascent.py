@@ -13,17 +13,19 @@ BFGS (Nocedal and Wright 2006, formula 6.17) with backtracking; coordinates at a
 stay there, the others' steps are cut off at the borders (Bertsekas 1982).
 """
 
+from collections.abc import Callable
 from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Objective", "climb"]
+__all__ = ["Objective", "by_differences", "climb"]
 
 _FIRST_STEP: Final = 0.05  # length of the first step and the longest one later, in box widths
 _LONGEST_STEP: Final = 0.25
 _SUFFICIENT: Final = 1e-4  # share of the gain promised by the slope that a step must bring
 _SHORTEN: Final = 0.25
+_DIFFERENCE: Final = 1e-4  # step of finite differences, in box widths
 _PRECISION: Final = 1e-8  # an ascent ends when a step gains less than this, or is shorter
 
 
@@ -88,6 +90,18 @@ def climb(
             alive, U, F, G, B = alive[going], U[going], F[going], G[going], B[going]
             t, fresh, low, high = t[going], fresh[going], low[going], high[going]
     return points, values
+
+
+def by_differences(
+    objective: Callable[[NDArray[np.float64]], NDArray[np.float64]], U: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return values (q,) and gradients (q, d) of an objective at U (q, d), by central differences."""
+    q, d = U.shape
+    steps = _DIFFERENCE * np.eye(d)
+    around = (U[:, None, :] + np.concatenate([steps, -steps])).reshape(-1, d)
+    values = objective(np.concatenate([U, around]))
+    sides = values[q:].reshape(q, 2, d)
+    return values[:q], (sides[:, 0] - sides[:, 1]) / (2.0 * _DIFFERENCE)
 
 
 def _scaled_identity(scales: NDArray[np.float64], d: int) -> NDArray[np.float64]:

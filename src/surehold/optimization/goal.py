@@ -227,7 +227,7 @@ class Goal:
         return Acquisition(posterior, self.criterion, perturbations, best, margin=margin, kappa=self.kappa)
 
     def _looks(self, posterior: Posterior, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        return where_to_look(posterior, u, self.accurate, self.coarse.quadrature.offsets)
+        return where_to_look(posterior, u, self.accurate, self.coarse.around(u[None, :])[0] - u)
 
     def _risk(self, posterior: Posterior, best: float) -> RiskImprovement:
         # The same draws at every call: ranking must not depend on how often it was asked for.

@@ -1,6 +1,7 @@
-"""How far the reached input strays from the commanded one: a zero-mean Gaussian over the variables of a box."""
+"""How far the reached input strays from the commanded one: its distribution over the variables of a box."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +13,9 @@ __all__ = ["InputNoise"]
 
 
 class InputNoise:
-    """Gaussian input noise: reached = commanded + N(0, covariance).
+    """Input noise: reached = commanded + N(0, covariance).
+
+    `InputNoise.uniform` is bounded noise, `InputNoise.varying` noise that differs from place to place.
 
     Parameters
     ----------
@@ -44,6 +47,44 @@ class InputNoise:
         self._deviations = None if standard_deviations is None else _checked_deviations(standard_deviations)
         self._covariance = None if covariance is None else _checked_covariance(covariance)
         self._unit: float | None = None
+        self._function: Callable[[NDArray[np.float64]], Any] | None = None
+        self.bounded = False
+
+    @classmethod
+    def uniform(cls, half_widths: Mapping[str, float]) -> "InputNoise":
+        """Return bounded noise, equally likely anywhere within plus and minus `half_widths` {name: value}.
+
+        In the box's units, one entry a variable; 0 means that the variable is exact. Raises InputError for half-widths
+        that are negative or not finite.
+
+        Examples
+        --------
+        >>> box = Box({"dx": (-0.05, 0.05)})
+        >>> InputNoise.uniform({"dx": 0.003}).unit_covariance(box)
+        array([[0.0003]])
+        """
+        noise = cls({name: value / 3.0**0.5 for name, value in _checked_deviations(half_widths).items()})
+        noise.bounded = True
+        return noise
+
+    @classmethod
+    def varying(cls, function: Callable[[NDArray[np.float64]], Any]) -> "InputNoise":
+        """Return Gaussian noise that depends on the input: function(x (d,)), in the box's units.
+
+        It returns what the constructor takes at that place: {name: standard deviation}, standard deviations (d,), or a
+        covariance (d, d); which variables are exact must not depend on x. What it returns is checked when it is used.
+        """
+        if not callable(function):
+            raise InputError(f"input noise is {function!r}; give a function of x (d,) that returns the noise there.")
+        noise = cls.unit(1.0)
+        noise._unit = None
+        noise._function = function
+        return noise
+
+    @property
+    def varies(self) -> bool:
+        """Whether the noise differs from place to place."""
+        return self._function is not None
 
     @classmethod
     def unit(cls, standard_deviation: float) -> "InputNoise":
@@ -52,18 +93,25 @@ class InputNoise:
         if value == 0.0:
             raise InputError("input noise of 0 in every variable is no noise; pass input_noise=None.")
         noise = cls.__new__(cls)
-        noise._deviations = noise._covariance = None
+        noise._deviations = noise._covariance = noise._function = None
         noise._unit = value
+        noise.bounded = False
         return noise
 
-    def unit_covariance(self, box: Box) -> NDArray[np.float64]:
+    def unit_covariance(self, box: Box, x: ArrayLike | None = None) -> NDArray[np.float64]:
         """Return the covariance (d, d) in the unit cube of `box`.
+
+        Noise that varies is asked at x (d,), in the box's units; in the middle of the box where x is None.
 
         Raises
         ------
         InputError
-            If names are unknown or missing, or the covariance has the wrong size for the box.
+            If names are unknown or missing, the covariance has the wrong size for the box, or the function of varying
+            noise returns something else than noise.
         """
+        if self._function is not None:
+            place = box.from_unit(np.full(box.dimension, 0.5)) if x is None else np.asarray(x, dtype=np.float64)
+            return self._at(place, box).unit_covariance(box)
         if self._unit is not None:
             return np.eye(box.dimension) * self._unit**2
         if self._covariance is not None:
@@ -85,12 +133,57 @@ class InputNoise:
             )
         return np.diag((np.array([deviations[name] for name in box.names]) / box.widths) ** 2)
 
+    def unit_roots(self, box: Box, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return lower triangular R (q, d, d) with R R' = covariance at points U (q, d) of the unit cube."""
+        if self._function is None:
+            return np.broadcast_to(root_of(self.unit_covariance(box)), (len(U), box.dimension, box.dimension))
+        return np.array([root_of(self.unit_covariance(box, x)) for x in box.from_unit(np.clip(U, 0.0, 1.0))])
+
+    def draws(self, box: Box, u: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return n draws (n, d) of the noise at a point u (d,) of the unit cube."""
+        root = self.unit_roots(box, u[None, :])[0]
+        shape = (n, box.dimension)
+        standard = rng.uniform(-(3.0**0.5), 3.0**0.5, shape) if self.bounded else rng.standard_normal(shape)
+        return standard @ root.T
+
+    def _at(self, x: NDArray[np.float64], box: Box) -> "InputNoise":
+        """Return the noise that the user's function states at x (d,), checked."""
+        assert self._function is not None
+        stated = self._function(x)
+        try:
+            if isinstance(stated, Mapping):
+                return InputNoise(stated)
+            array = np.asarray(stated, dtype=np.float64)
+            if array.shape == (box.dimension,):
+                return InputNoise(dict(zip(box.names, array.tolist(), strict=True)))
+            if array.shape == (box.dimension, box.dimension):
+                return InputNoise(covariance=array)
+        except (TypeError, ValueError) as error:  # InputError is a ValueError
+            raise InputError(f"the input-noise function returned nonsense at {box.as_dict(x)}: {error}") from None
+        raise InputError(
+            f"the input-noise function returned an array of shape {array.shape} at {box.as_dict(x)}; it must return "
+            f"{{name: standard deviation}}, ({box.dimension},) or ({box.dimension}, {box.dimension})."
+        )
+
     def __repr__(self) -> str:
+        if self._function is not None:
+            return f"InputNoise.varying({getattr(self._function, '__name__', self._function)!r})"
+        if self.bounded and self._deviations is not None:
+            half_widths = {name: round(3.0**0.5 * value, 12) for name, value in self._deviations.items()}
+            return f"InputNoise.uniform({half_widths})"
         if self._unit is not None:
             return f"InputNoise.unit({self._unit:g})"
         if self._covariance is not None:
             return f"InputNoise(covariance={self._covariance.tolist()})"
         return f"InputNoise({self._deviations})"
+
+
+def root_of(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return L (d, d) with L L' = covariance; variables without noise have zero rows."""
+    shaken = np.flatnonzero(np.diag(covariance) > 0.0)
+    root = np.zeros_like(covariance)
+    root[np.ix_(shaken, shaken)] = np.linalg.cholesky(covariance[np.ix_(shaken, shaken)])
+    return root
 
 
 def _checked_deviation(name: str, value: float) -> float:

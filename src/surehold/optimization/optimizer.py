@@ -5,13 +5,13 @@ Legend
     t   trials told, failed ones included
 """
 
+import warnings
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.optimization import quadratures
 from surehold.optimization.acquisition import criterion_name
 from surehold.optimization.box import Box
 from surehold.optimization.designs import design as initial_design
@@ -21,6 +21,7 @@ from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.lattice import Lattice, LatticePosterior
 from surehold.optimization.local_global import LocalGlobalProcess
 from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
+from surehold.optimization.quadratures import exact
 from surehold.optimization.recommendation import Recommendation, recommendation
 from surehold.optimization.risk import Risk
 from surehold.optimization.robustness import Perturbations
@@ -148,14 +149,14 @@ class Optimizer:
         risk = Risk(risk) if isinstance(risk, str) else risk
         if input_noise is None and (name.scale != "exact" or risk.name != "mean"):
             raise InputError(f"criterion '{criterion}' and risk '{risk.name}' need input noise; give input_noise=.")
-        d = box.dimension
-        self._covariance = np.zeros((d, d)) if input_noise is None else input_noise.unit_covariance(box)
+        if input_noise is not None:
+            _warn_if_huge(input_noise, box)
         many = name.scale == "robust" or risk.name != "mean"
         rule = quadrature or ("quasi_monte_carlo" if many else "unscented")
         self._goal = Goal(
             criterion=name,
-            accurate=Perturbations(quadratures.quadrature(rule, self._covariance, k), border),
-            coarse=Perturbations(quadratures.sigma_points(self._covariance), border),
+            accurate=Perturbations.of(input_noise, box, rule, border, k=k),
+            coarse=Perturbations.of(input_noise, box, "unscented", border),
             risk=risk,
             margin=0.0 if thesis is None else thesis.margin,
             kappa=float(kappa),
@@ -304,7 +305,8 @@ class Optimizer:
                 u, observed = tried[index], float(values[index])
             else:
                 u, observed = self._snapped(self._goal.best(posterior, tried, self._rng(3, len(self._trials)))), np.nan
-            reached = Perturbations(quadratures.quasi_monte_carlo(self._covariance, 7), self._goal.accurate.border)
+            border = self._goal.accurate.border
+            reached = Perturbations.of(self.input_noise, self.box, "quasi_monte_carlo", border, exponent=7)
             highest = int(np.argmax(values))
             return recommendation(
                 posterior,
@@ -323,7 +325,7 @@ class Optimizer:
         With `under_noise`, of the outcome averaged over the input noise instead.
         """
         U = np.atleast_2d(self.box.to_unit(X))
-        perturbations = self._goal.accurate if under_noise else Perturbations(quadratures.exact(self.box.dimension))
+        perturbations = self._goal.accurate if under_noise else Perturbations(exact(self.box.dimension))
         with single_threaded():
             mean, variance = mixture(perturbations.outcome(self._posterior(), U))
         return mean, np.sqrt(variance)
@@ -369,6 +371,18 @@ class Optimizer:
 
     def _rng(self, purpose: int, position: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, purpose, position])
+
+
+def _warn_if_huge(noise: InputNoise, box: Box) -> None:
+    deviation = np.sqrt(np.diag(noise.unit_covariance(box)))
+    for name, width, share in zip(box.names, box.widths, deviation, strict=True):
+        if share > 0.5:
+            warnings.warn(
+                f"input noise of {name} has a standard deviation of {share * width:.3g}, {share:.1f} times the box: "
+                "wherever it is commanded, the reached input may be anywhere in the box and beyond, so that hardly any "
+                "place is safer than another. Check its unit, or give a wider box.",
+                stacklevel=3,
+            )
 
 
 def _count(name: str, value: int, least: int) -> int:

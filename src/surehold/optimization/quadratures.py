@@ -42,10 +42,14 @@ class Quadrature(NamedTuple):
     """(s,), summing to 1"""
 
 
-def quadrature(name: str, covariance: ArrayLike, k: float = 1.0) -> Quadrature:
-    """Return the rule of that name for N(0, covariance); `k` is of "unscented" alone.
+def quadrature(
+    name: str, covariance: ArrayLike, k: float = 1.0, *, bounded: bool = False, exponent: int = 5
+) -> Quadrature:
+    """Return the rule of that name for N(0, covariance).
 
-    Raises InputError for an unknown name or a covariance that is not one.
+    `k` is of "unscented" alone, `exponent` of "quasi_monte_carlo". For `bounded` noise, uniform in every variable, "gauss_hermite" is the Gauss-Legendre rule and "quasi_monte_carlo"
+    spreads its points evenly; the others know mean and covariance only. Raises InputError for an unknown name or a
+    covariance that is not one.
     """
     if name == "unscented":
         return sigma_points(covariance, k)
@@ -54,9 +58,9 @@ def quadrature(name: str, covariance: ArrayLike, k: float = 1.0) -> Quadrature:
     if name == "central_difference":
         return central_difference_points(covariance)
     if name == "gauss_hermite":
-        return gauss_hermite(covariance)
+        return gauss_hermite(covariance, bounded=bounded)
     if name == "quasi_monte_carlo":
-        return quasi_monte_carlo(covariance)
+        return quasi_monte_carlo(covariance, exponent, bounded)
     raise unknown_name("quadrature", name, QUADRATURES)
 
 
@@ -133,11 +137,11 @@ def central_difference_points(covariance: ArrayLike, step: float = 3.0**0.5) -> 
     return _star(noisy, root, d, step, 1.0 - r / step**2)
 
 
-def gauss_hermite(covariance: ArrayLike, order: int = 3) -> Quadrature:
+def gauss_hermite(covariance: ArrayLike, order: int = 3, bounded: bool = False) -> Quadrature:
     """Return the product Gauss-Hermite rule of `order` points a noisy variable: s = order ** r.
 
-    Exact for polynomials up to degree 2 order - 1 in each variable. Raises InputError for an order below 1 or more
-    than 10,000 points.
+    For `bounded` noise, uniform and independent, Gauss-Legendre instead. Exact for polynomials up to degree
+    2 order - 1 in each variable. Raises InputError for an order below 1 or more than 10,000 points.
     """
     noisy, root, d = _root(covariance)
     r = len(noisy)
@@ -147,7 +151,8 @@ def gauss_hermite(covariance: ArrayLike, order: int = 3) -> Quadrature:
         return exact(d)
     if order**r > 10_000:
         raise InputError(f"order {order} in {r} noisy variables makes {order**r} points; use 'unscented' instead.")
-    nodes, weights = np.polynomial.hermite_e.hermegauss(order)
+    nodes, weights = np.polynomial.legendre.leggauss(order) if bounded else np.polynomial.hermite_e.hermegauss(order)
+    nodes = nodes * 3.0**0.5 if bounded else nodes  # unit variance
     grid = np.stack(np.meshgrid(*[nodes] * r, indexing="ij"), axis=-1).reshape(-1, r)
     product = np.ones(len(grid))
     for column in np.stack(np.meshgrid(*[weights / weights.sum()] * r, indexing="ij"), axis=-1).reshape(-1, r).T:
@@ -157,8 +162,10 @@ def gauss_hermite(covariance: ArrayLike, order: int = 3) -> Quadrature:
     return Quadrature(offsets, product / product.sum())
 
 
-def quasi_monte_carlo(covariance: ArrayLike, exponent: int = 5) -> Quadrature:
+def quasi_monte_carlo(covariance: ArrayLike, exponent: int = 5, bounded: bool = False) -> Quadrature:
     """Return 2**exponent equally weighted quasi-random points of N(0, covariance): a shifted Sobol sequence.
+
+    Of uniform noise with that covariance where it is `bounded`.
 
     For spread and quantiles, which a handful of sigma points cannot give. Points come in pairs of opposite sign, so
     that the mean is exactly 0.
@@ -171,7 +178,7 @@ def quasi_monte_carlo(covariance: ArrayLike, exponent: int = 5) -> Quadrature:
         return exact(d)
     half = 2 ** (exponent - 1)
     uniform = qmc.Sobol(len(noisy), scramble=False).random_base2(exponent - 1) + 0.5 / half
-    normal = ndtri(uniform)
+    normal = 2.0 * uniform - 1.0 if bounded else ndtri(uniform)
     normal /= np.sqrt(np.mean(normal**2, axis=0))  # unit variance exactly, too
     offsets = np.zeros((2 * half, d))
     offsets[:, noisy] = np.concatenate([normal, -normal]) @ root.T

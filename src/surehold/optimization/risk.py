@@ -8,7 +8,6 @@ Legend
     beta      standard deviations taken off the mean, or added to and taken off the model's mean in the worst case
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
+from surehold.optimization.ascent import by_differences
 from surehold.optimization.robustness import Perturbations
 from surehold.optimization.surrogate import Posterior
 
@@ -23,7 +23,6 @@ __all__ = ["RISKS", "Risk", "RiskImprovement", "WorstCaseBound"]
 
 RISKS: Final = ("mean", "mean-std", "var", "cvar", "worst")
 _DRAWS: Final = 16  # joint draws a particle; common random numbers make the criterion a smooth function of the query
-_STEP: Final = 1e-4  # of the finite differences, in box widths
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ class RiskImprovement:
 
     def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return values (q,) and gradients (q, d) at U (q, d), by central differences on common random numbers."""
-        return _by_differences(self, U)
+        return by_differences(self, U)
 
 
 class WorstCaseBound:
@@ -134,7 +133,7 @@ class WorstCaseBound:
 
     def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the bounds (q,) and their gradients (q, d) at U (q, d), by central differences."""
-        return _by_differences(self, U)
+        return by_differences(self, U)
 
     def weakest(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the perturbed points (s, d) of u (d,), inside the cube, the one with the lowest lower bound first."""
@@ -147,15 +146,3 @@ class WorstCaseBound:
         mean = moments.mean.mean(axis=0)
         variance = moments.variance.mean(axis=0) + moments.mean.var(axis=0)
         return (mean + kappa * np.sqrt(variance)).reshape(len(U), -1)
-
-
-def _by_differences(
-    objective: Callable[[NDArray[np.float64]], NDArray[np.float64]], U: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return values (q,) and gradients (q, d) at U (q, d)."""
-    q, d = U.shape
-    steps = _STEP * np.eye(d)
-    around = (U[:, None, :] + np.concatenate([steps, -steps])).reshape(-1, d)
-    values = objective(np.concatenate([U, around]))
-    sides = values[q:].reshape(q, 2, d)
-    return values[:q], (sides[:, 0] - sides[:, 1]) / (2.0 * _STEP)

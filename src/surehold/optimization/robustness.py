@@ -7,6 +7,7 @@ Legend
     g(x)     outcome under the input noise, E f(x + noise), about sum_i w_i f(x + xi_i)      [UO, thesis (3.21)]
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import unknown_name
-from surehold.optimization.quadratures import Quadrature
+from surehold.optimization.box import Box
+from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.quadratures import Quadrature, exact, quadrature
 from surehold.optimization.surrogate import Moments, Posterior
 
 __all__ = ["BORDERS", "Perturbations"]
@@ -31,11 +34,34 @@ class Perturbations:
     """
 
     quadrature: Quadrature
+    """of the noise itself; of standard normal variables where `root` scales them"""
     border: str = "extend"
+    root: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
+    """for noise that varies: points (q, d) -> roots of the covariances there, (q, d, d)"""
 
     def __post_init__(self) -> None:
         if self.border not in BORDERS:
             raise unknown_name("border rule", self.border, BORDERS)
+
+    @classmethod
+    def of(
+        cls,
+        noise: InputNoise | None,
+        box: Box,
+        rule: str,
+        border: str = "extend",
+        *,
+        k: float = 1.0,
+        exponent: int = 5,
+    ) -> "Perturbations":
+        """Return the perturbations of an input noise by a quadrature rule; None is no noise."""
+        if noise is None:
+            return cls(exact(box.dimension), border)
+        covariance = noise.unit_covariance(box)
+        if not noise.varies:
+            return cls(quadrature(rule, covariance, k, bounded=noise.bounded, exponent=exponent), border)
+        standard = np.diag((np.diag(covariance) > 0.0).astype(np.float64))
+        return cls(quadrature(rule, standard, k, exponent=exponent), border, lambda U: noise.unit_roots(box, U))
 
     def around(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the perturbed points (q, s, d) of U (q, d)."""
@@ -58,6 +84,8 @@ class Perturbations:
     def _at(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
         """Return offsets, and the derivative of each perturbed coordinate by the query's (None: 1 everywhere)."""
         offsets = self.quadrature.offsets
+        if self.root is not None:
+            offsets = np.einsum("qde,se->qsd", self.root(U), offsets)
         if self.border == "extend":
             return offsets, None
         points = U[:, None, :] + offsets

@@ -40,10 +40,10 @@ class RobustScore:
 def perturbed_points(
     x: ArrayLike, box: Box, noise: InputNoise, n: int = 100, seed: int | np.random.Generator = 0
 ) -> NDArray[np.float64]:
-    """Draw n inputs x + N(0, S) around x (d,) -> (n, d), in the units of the box.
+    """Draw n inputs x + noise around x (d,) -> (n, d), in the units of the box.
 
     A coordinate that would leave the box keeps its noise-free value (the thesis' rule). The draw depends on
-    (S, n, seed) only, so two inputs that are compared are shaken in the same way.
+    (noise, n, seed) only, so two inputs that are compared are shaken in the same way.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def perturbed_points(
         raise InputError(f"x = {center[0].tolist()} lies outside {box!r}; score a point of the box.")
     rng = np.random.default_rng(seed)
     unit = box.to_unit(center[0])
-    reached = unit + rng.standard_normal((int(n), box.dimension)) @ _root(noise.unit_covariance(box)).T
+    reached = unit + noise.draws(box, unit, int(n), rng)
     outside = (reached < 0.0) | (reached > 1.0)
     return np.where(outside, center[0], box.from_unit(np.clip(reached, 0.0, 1.0)))
 
@@ -91,11 +91,3 @@ def _outcome(problem: Problem, point: NDArray[np.float64]) -> float:
         return float(problem(point))
     except Exception:  # a user's function may raise anything; the failure is counted, the score goes on
         return float("nan")
-
-
-def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return L (d, d) with L L' = covariance; variables without noise have zero rows."""
-    shaken = np.flatnonzero(np.diag(covariance) > 0.0)
-    root = np.zeros_like(covariance)
-    root[np.ix_(shaken, shaken)] = np.linalg.cholesky(covariance[np.ix_(shaken, shaken)])
-    return root

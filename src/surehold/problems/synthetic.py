@@ -290,6 +290,10 @@ def _highest(f: Callable[[NDArray[np.float64]], object], box: Box, starts: NDArr
 
 def _covariance(noise: InputNoise, box: Box) -> NDArray[np.float64]:
     """Return the covariance (d, d) of the noise in the units of the box."""
+    if noise.bounded or noise.varies:
+        raise InputError(
+            f"{noise!r} has no closed form; use robust_score, or Gaussian noise that is the same everywhere."
+        )
     return noise.unit_covariance(box) * np.outer(box.widths, box.widths)
 
 

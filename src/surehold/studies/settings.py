@@ -120,6 +120,10 @@ def _noise_to_json(noise: InputNoise | None, space: SearchSpace) -> dict[str, An
     numbers = space.numbers
     if noise is None or numbers is None:
         return None
+    if noise.bounded or noise.varies:
+        raise InputError(
+            f"a study stores Gaussian noise that is the same everywhere, not {noise!r}; give its covariance."
+        )
     covariance = noise.unit_covariance(numbers)
     deviations = np.sqrt(np.diag(covariance)) * numbers.widths
     if np.array_equal(covariance, np.diag(np.diag(covariance))):
