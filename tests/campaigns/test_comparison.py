@@ -29,6 +29,7 @@ def records_of(plan, runs, results, measure="best", **more):
     for (p, m), values in results.items():
         for seed, value in enumerate(values):
             row = {"problem": p, "method": m, "seed": seed, "status": "done", "trials": 4, "cpu_seconds": 2.0}
+            row |= {"initial": 2, "ask_seconds": [0.0, 0.0, 0.25, 0.35]}
             row |= {measure: [[0, value - 1.0], [2, value]], "versions": {"source": "a"}, **more}
             records.rows[p, m, seed] = row
     return records
@@ -72,6 +73,7 @@ def test_verdicts_beside_the_published_number(mean, verdict):
     (row,) = rows_of(records)
     assert row.verdict == verdict
     assert row.ours.n == row.planned == 100
+    assert (row.seconds, row.ask_seconds) == (2.0, pytest.approx(0.3))
     expected = stats.ttest_ind_from_stats(mean, 0.386, 100, 5.3279, row.theirs.std, 100, equal_var=False).pvalue
     assert row.p == pytest.approx(expected, rel=1e-6)
 
@@ -144,7 +146,7 @@ def test_claims_that_are_not_shown_come_with_what_is_seen():
     assert first.reason == "within 1 % of the maximum end 30 of 31 runs of GP and 31 of 31 of TGP-winf"
     few = {key: values[:5] for key, values in results.items()}
     told = claim_results({"table-4.1": records_of("table-4.1", 100, few)})
-    assert next(t.reason for t in told if t.result) == "only 5 common seeds so far"
+    assert next(t.verdict for t in told if t.result) == "too few runs"
 
 
 def test_curves_are_means_with_bands_and_the_first_split():

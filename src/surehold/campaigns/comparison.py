@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -46,6 +46,8 @@ class Row:
     """"agrees", "better", "differs", or empty"""
     seconds: float
     """mean CPU seconds of a run; NaN without runs"""
+    ask_seconds: float
+    """mean CPU seconds of asking for a trial after the initial design; NaN without runs"""
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class ClaimResult:
     p: float
     """Holm-adjusted within the table"""
     verdict: str
-    """"holds", "not shown", "contradicted" or "no runs" """
+    """"holds", "not shown", "contradicted", "too few runs" or "no runs" """
     reason: str
     """why a claim does not hold, where that is seen; else empty"""
 
@@ -131,6 +133,7 @@ def rows_of(records: Records) -> list[Row]:
                     p,
                     "",
                     float(np.mean([row["cpu_seconds"] for row in own])) if own else math.nan,
+                    float(np.mean([s for row in own for s in row["ask_seconds"][row["initial"] :]] or [math.nan])),
                 )
             )
     adjusted = _holm_where([row.p for row in rows])
@@ -193,6 +196,8 @@ def _claim_word(claim: Claim, difference: Paired | None, p: float) -> str:
     if difference is None:
         return "no runs"
     word = _word(difference, p, claim.measure)
+    if word == "no difference shown" and difference.n < _FEW:
+        return "too few runs"
     if claim.expected == "no better":
         return "contradicted" if word == "better" else "holds"
     return {"better": "holds", "worse": "contradicted"}.get(word, "not shown")
@@ -201,8 +206,6 @@ def _claim_word(claim: Claim, difference: Paired | None, p: float) -> str:
 def _reason(records: Records | None, claim: Claim, difference: Paired | None, word: str) -> str:
     if records is None or difference is None or word not in ("not shown", "contradicted"):
         return ""
-    if difference.n < _FEW:
-        return f"only {difference.n} common seeds so far"
     reference = final_values(records, claim.problem, claim.than, claim.measure)
     function = next(cell["function"] for cell in records.header["cells"] if cell["problem"] == claim.problem)
     if claim.measure == "best" and function in SYNTHETIC:
@@ -232,7 +235,7 @@ def _judged(row: Row, p: float) -> Row:
             verdict = ""
         else:
             verdict = "better" if (gap > 0.0) != (row.measure in LOWER) else "differs"
-    return Row(**{**row.__dict__, "p": p, "verdict": verdict})
+    return replace(row, p=p, verdict=verdict)
 
 
 def _holm_where(p: Iterable[float]) -> list[float]:

@@ -110,7 +110,7 @@ def campaign_report(campaigns: dict[str, Records], *, illustrated: bool = True) 
 
 
 def _headline(campaigns: dict[str, Records]) -> str:
-    told = [result for result in claim_results(campaigns) if result.plan in campaigns and result.result is not None]
+    told = [r for r in claim_results(campaigns) if r.verdict not in ("no runs", "too few runs")]
     if not told:
         runs = sum(len(records.done) for records in campaigns.values())
         return f"{len(campaigns)} campaigns, {runs:,} runs."

@@ -35,6 +35,7 @@ _MARKS: Final[dict[str, Mark]] = {
     "worse": "bad",
     "not shown": "open",
     "no difference shown": "open",
+    "too few runs": "open",
     "no runs": "open",
     "": "",
 }
@@ -107,7 +108,7 @@ def _curve_panel(records: Records, problem: str, measure: str, band: float) -> P
 
 def _result_table(records: Records, rows: list[Row]) -> Table:
     exhibit = exhibit_of(records.header["plan"])
-    head = ["problem", "method", "runs", "mean ± se", "median", "95 % bootstrap", "CPU s a run"]
+    head = ["problem", "method", "runs", "mean ± se", "median", "95 % bootstrap", "CPU s a run", "an ask"]
     several = len({row.measure for row in rows}) > 1
     if several:
         head.insert(2, "measure")
@@ -119,7 +120,7 @@ def _result_table(records: Records, rows: list[Row]) -> Table:
         runs += f", {row.failed} failed" if row.failed else ""
         cells = [row.problem, row.method, *([LABELS[row.measure]] if several else []), runs]
         if row.ours is None:
-            cells += ["–", "–", "–", "–"]
+            cells += ["–"] * 5
         else:
             own = row.ours
             cells += [
@@ -127,6 +128,7 @@ def _result_table(records: Records, rows: list[Row]) -> Table:
                 number(own.median, 5),
                 f"{number(own.low, 5)} to {number(own.high, 5)}",
                 number(row.seconds, 2),
+                number(row.ask_seconds, 2),
             ]
         if exhibit is not None:
             theirs = row.theirs
@@ -209,7 +211,7 @@ def claims_table(campaigns: Mapping[str, Records]) -> Table:
     head = ("claim of the thesis", "settings", "common seeds", "difference ± se", "p", "what is seen", "verdict")
     note = (
         "Wilcoxon's signed-rank test on common seeds, Holm-adjusted within a table of the thesis. A claim of no gain "
-        "holds unless a gain is shown."
+        "holds unless a gain is shown by 20 seeds or more."
     )
     return Table("claims", "The thesis' claims", head, tuple(body), tuple(marks), note)
 

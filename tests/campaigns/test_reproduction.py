@@ -1,0 +1,35 @@
+from pathlib import Path
+
+from surehold.campaigns import reproduction
+from surehold.campaigns.reproduction import reproduction_text
+from surehold.campaigns.runner import run_campaign
+from surehold.campaigns.table import PACKED, read_folder
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_document_is_in_step_with_the_results():
+    told = (ROOT / "docs" / "reproduction.md").read_text(encoding="utf-8")
+    assert told == reproduction_text(ROOT / "results"), "run `make reproduction` and commit docs/reproduction.md"
+
+
+def test_results_are_compact():
+    assert sum(path.stat().st_size for path in (ROOT / "results").rglob("*")) < 8e6
+    assert {path.name for path in (ROOT / "results").glob("*/*")} == {PACKED}
+
+
+def test_packing_and_writing(tmp_path, monkeypatch, cheap):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "docs").mkdir()
+    run_campaign(cheap, tmp_path / "runs/campaigns/cheap", runs=2)
+    reproduction.main(["--pack"])
+    text = (tmp_path / "docs/reproduction.md").read_text()
+    assert "8 of 16 planned runs" in text
+    assert "BO on hill: 2; UBO on hill: 2; BO on flat: 2; UBO on flat: 2" in text, "unfinished cells are not shown"
+    run_campaign(cheap, tmp_path / "results/cheap")  # continues from the packed table
+    assert len(read_folder(tmp_path / "results/cheap").rows) == 16
+    reproduction.main(["--pack"])
+    assert [path.name for path in (tmp_path / "results/cheap").iterdir()] == [PACKED]
+    text = (tmp_path / "docs/reproduction.md").read_text()
+    assert "16 of 16 planned runs" in text
+    assert "unfinished" not in text
