@@ -47,9 +47,9 @@ def quadrature(
 ) -> Quadrature:
     """Return the rule of that name for N(0, covariance).
 
-    `k` is of "unscented" alone, `exponent` of "quasi_monte_carlo". For `bounded` noise, uniform in every variable, "gauss_hermite" is the Gauss-Legendre rule and "quasi_monte_carlo"
-    spreads its points evenly; the others know mean and covariance only. Raises InputError for an unknown name or a
-    covariance that is not one.
+    `k` is of "unscented" alone, `exponent` of "quasi_monte_carlo". For `bounded` noise, uniform in every variable,
+    "gauss_hermite" is the Gauss-Legendre rule and "quasi_monte_carlo" spreads its points evenly; the others know mean
+    and covariance only. Raises InputError for an unknown name or a covariance that is not one.
     """
     if name == "unscented":
         return sigma_points(covariance, k)
