@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from exact_mesh import ExactMesh, capsule_pair
 
-from surehold.grasping.closing import TOUCH, link_ends
+from surehold.grasping.closing import TOUCH
 from surehold.grasping.grasp import Simulator
+from surehold.grasping.hand import CLOSED, link_ends
 from surehold.grasping.poses import default_pose
-from surehold.grasping.synergy import CLOSED, power_grasp
+from surehold.grasping.synergy import closing_motion
 
 _MESH = 4e-5  # a mesh of flat faces is up to 0.02 mm inside the round object, the field up to 0.01 mm off
 
@@ -43,16 +44,16 @@ def test_touching_links_touch_and_none_is_inside(name, mode, standoff, closing):
             assert gap > -2e-5, f"{body} is inside the object"
             if body in bodies:
                 assert gap < 2 * TOUCH
-                assert abs(exact.capsule(ends[body, 0], ends[body, 1], simulator.hand.radius)) < _MESH
+                assert abs(exact.capsule(ends[body, 0], ends[body, 1], simulator.hand.radii[0, 0])) < _MESH
 
 
 @pytest.mark.parametrize("closing", ["adaptive", "synergy"])
 def test_no_touch_is_missed_on_the_way(closing):
     """Where a link was stopped it had not been before: replay the closing in small steps with exact distances."""
     simulator = Simulator(obj="mug", closing=closing, contact="single")
-    exact, radius = ExactMesh(simulator.object), simulator.hand.radius
+    exact, radius = ExactMesh(simulator.object), simulator.hand.radii[0, 0]
     for pose, s1, grasp in trials(simulator, "right-front", 0.02, 2, 2):
-        motion = power_grasp(simulator.hand, s1)
+        motion = closing_motion(simulator.hand, s1)
         for t in np.linspace(2.5, CLOSED, 12):
             # A joint that was stopped stays where it is, the others follow the motion.
             joints = np.minimum(motion.joints(t), grasp.joints)
@@ -79,7 +80,7 @@ def test_a_stopped_joint_would_run_into_something():
 def test_closing_follows_the_synergy_until_the_touch():
     simulator = Simulator(obj="mug", contact="single", closing="synergy")
     for _, s1, grasp in trials(simulator, "right-front", 0.02, 10, 4):
-        motion = power_grasp(simulator.hand, s1)
+        motion = closing_motion(simulator.hand, s1)
         for f in range(5):
             t = np.linspace(0.0, CLOSED, 20_001)
             way = np.clip(
@@ -108,8 +109,8 @@ def test_fingers_do_not_enter_each_other_or_the_palm():
         opened = link_ends(simulator.hand.bases, simulator.hand.chains, grasp.open_joints)
         for a in range(20):
             for b in range(4 * (a // 4) + 4, 20):
-                if capsule_pair(opened[a], opened[b], simulator.hand.radius) > 0.0:
-                    assert capsule_pair(ends[a], ends[b], simulator.hand.radius) > -1e-5, (s1, a, b)
+                if capsule_pair(opened[a], opened[b], simulator.hand.radii[0, 0]) > 0.0:
+                    assert capsule_pair(ends[a], ends[b], simulator.hand.radii[0, 0]) > -1e-5, (s1, a, b)
         assert ends[[b for b in range(20) if b % 4 > 1], 1, 2].min() > -0.02
 
 

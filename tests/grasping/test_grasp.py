@@ -117,7 +117,7 @@ def test_scene_holds_watertight_bodies_in_the_world(simulator):
     assert len(scene.bodies) == len(scene.points) == len(scene.weights) == len(grasp.contacts)
     assert len(opened.points) == 0
     palm = next(body for body in scene.hand if body.name == "palm")
-    expected = 8 * np.prod(there.hand.palm_half_extents)
+    expected = 8 * np.prod(there.hand.palm_half_extents[0])
     assert 0.85 * expected < trimesh.Trimesh(palm.vertices, palm.faces, process=False).volume < expected
 
 

@@ -3,9 +3,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
-from surehold.grasping.closing import link_ends
-from surehold.grasping.hand import FINGERS, PALM, hand_named, icub_left_hand, link_name
-from surehold.grasping.synergy import S1_USEFUL, power_grasp
+from surehold.grasping.grasp import Simulator
+from surehold.grasping.hand import chain_row, link_ends
+from surehold.grasping.hands import hand_named
+from surehold.grasping.icub_hand import icub_left_hand, icub_right_hand
+from surehold.grasping.poses import Pose, default_pose
+from surehold.grasping.synergy import closing_motion
 
 
 def transform(rotation=None, shift=(0.0, 0.0, 0.0)):
@@ -31,9 +34,9 @@ TABLE = {
 }
 
 
-@pytest.mark.parametrize("finger", FINGERS)
+@pytest.mark.parametrize("finger", TABLE)
 def test_forward_kinematics_equals_a_product_of_matrices(finger):
-    hand, f = icub_left_hand(), FINGERS.index(finger)
+    hand, f = icub_left_hand(), list(TABLE).index(finger)
     x, y, z, roll, pitch, yaw, a1, d, a2, a3 = TABLE[finger]
     base = transform(Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=True), (x, y, z))
     if finger == "thumb":
@@ -77,19 +80,19 @@ def test_power_grasp_follows_the_published_synergy():
             ]
         )
         expected = np.clip(expected, np.degrees(hand.lower), np.degrees(hand.upper))
-        np.testing.assert_allclose(np.degrees(power_grasp(hand, s1).joints(np.pi - c0)), expected, atol=1e-9)
+        np.testing.assert_allclose(np.degrees(closing_motion(hand, s1).joints(np.pi - c0)), expected, atol=1e-9)
 
 
 def test_thumb_opposition_is_at_its_ends_outside_the_useful_range():
     hand = icub_left_hand()
-    lowest, highest = (power_grasp(hand, s).joints(0.0)[4, 0] for s in S1_USEFUL[::-1])
+    lowest, highest = (closing_motion(hand, s).joints(0.0)[4, 0] for s in hand.preshapes["power"].s1_useful[::-1])
     assert np.degrees(lowest) == pytest.approx(0.0, abs=0.2)
     assert np.degrees(highest) == pytest.approx(120.0, abs=0.2)
 
 
 def test_fingers_bend_out_of_the_palm_and_the_thumb_opposes_them():
     hand = icub_left_hand()
-    closed = link_ends(hand.bases, hand.chains, power_grasp(hand).joints(4.5))
+    closed = link_ends(hand.bases, hand.chains, closing_motion(hand).joints(4.5))
     for f in range(4):
         assert closed[4 * f + 3, 1, 2] > 0.03, "a fingertip stands above the palm"
     thumb, middle = closed[19], closed[7]
@@ -98,8 +101,71 @@ def test_fingers_bend_out_of_the_palm_and_the_thumb_opposes_them():
 
 
 def test_names():
-    assert link_name(PALM) == "palm"
-    assert link_name(0) == "index knuckle"
-    assert link_name(19) == "thumb distal"
+    hand = icub_left_hand()
+    assert (hand.palm, hand.body_name(20), hand.body_name(0)) == (20, "palm", "index knuckle")
+    assert hand.body_name(19) == "thumb distal"
     with pytest.raises(InputError, match="icub-left"):
         hand_named("shadow")
+
+
+def test_right_hand_is_the_mirror_image():
+    left, right = icub_left_hand(), icub_right_hand()
+    across, rng = np.array([1.0, -1.0, 1.0]), np.random.default_rng(3)
+    for _ in range(20):
+        q = rng.uniform(left.lower, left.upper)
+        mirrored = link_ends(left.bases, left.chains, q) * across
+        np.testing.assert_allclose(link_ends(right.bases, right.chains, q), mirrored, atol=1e-15)
+    for turn in (right.bases[:, :, :3], right.chains[:, :, 7:].reshape(5, 4, 3, 4)[..., :3], right.palm_poses[..., :3]):
+        np.testing.assert_allclose(np.linalg.det(turn), 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("contact", ["graded", "single"])
+def test_mirrored_grasps_are_worth_the_same(contact):
+    """The bottle is its own mirror image: the right hand, mirrored, holds it exactly as the left one does."""
+    left = Simulator("icub-left", "bottle", contact=contact)
+    right = Simulator("icub-right", "bottle", contact=contact)
+    held = 0
+    for dx in np.linspace(-0.04, 0.02, 7):
+        for s1 in (-0.7, -0.2):
+            offsets = np.array([dx, 0.01, 0.0, 0.1, -0.2, 0.05])
+            pose = default_pose(left.hand, left.object, "right-back", 0.012, offsets)
+            mirrored = across_y(pose)
+            one, other = left.grasp(pose, s1), right.grasp(mirrored, s1)
+            held += one.status == "ok"
+            assert one.status == other.status
+            assert other.quality == pytest.approx(one.quality, abs=2e-3)  # the mesh of the field is not mirrored
+    assert held > 2
+
+
+def across_y(pose):
+    mirror = np.diag([1.0, -1.0, 1.0])
+    return Pose.from_matrix(np.column_stack([mirror @ pose.rotation @ mirror, mirror @ np.asarray(pose.position)]))
+
+
+def test_sliding_joints_and_links_that_are_not_there():
+    slide = chain_row(np.zeros(3), np.array([0.0, 0.02, 0.0]), np.eye(3, 4), slides=True)
+    turn = chain_row(np.zeros(3), np.array([0.03, 0.0, 0.0]), np.eye(3, 4))
+    base = np.column_stack([Rotation.from_euler("x", -90, degrees=True).as_matrix(), [0.0, 0.1, 0.0]])
+    ends = link_ends(base[None], np.stack([slide, turn])[None], np.array([[0.005, np.pi / 2]]))
+    np.testing.assert_allclose(ends[0], [[0.0, 0.105, 0.0], [0.0, 0.105, -0.02]], atol=1e-12)
+    np.testing.assert_allclose(ends[1], [[0.0, 0.105, 0.0], [0.0, 0.105, -0.03]], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["tripod", "pinch"])
+def test_other_grasp_types_leave_fingers_at_rest(name):
+    hand = icub_left_hand()
+    opened, closed = closing_motion(hand, 0.0, name).joints(0.0), closing_motion(hand, 0.0, name).joints(4.0)
+    at_rest = {"tripod": ["ring", "little"], "pinch": ["middle", "ring", "little"]}[name]
+    for f, finger in enumerate(hand.finger_names):
+        if finger in at_rest:
+            np.testing.assert_array_equal(opened[f, 1:], closed[f, 1:])
+            assert np.all(opened[f, 1:] > 0.5)
+        else:
+            assert closed[f].sum() > opened[f].sum() + 0.5
+    middle = closing_motion(hand, 0.0, name).joints(np.pi)[0]  # at c0 = 0 the recorded mean
+    np.testing.assert_allclose(np.degrees(middle[1:]), [11.6, 0.6 * 69.9, 0.4 * 69.9], atol=1e-9)
+
+
+def test_unknown_preshape_is_explained():
+    with pytest.raises(InputError, match="power, tripod, pinch"):
+        Simulator(preshape="hook")

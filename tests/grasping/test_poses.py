@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
-from surehold.grasping.hand import icub_left_hand
+from surehold.grasping.icub_hand import icub_left_hand
 from surehold.grasping.meshes import shipped_object
 from surehold.grasping.poses import FACETS, MODES, Pose, default_pose, facet_axes
 

@@ -125,12 +125,10 @@ def touching_links(names: Sequence[str]) -> str:
 def write_grasps(problem: Any, report: Any, path: Path) -> None:
     """Write the candidates of a report as an Isaac grasp file."""
     from surehold.grasping.formats import StoredGrasp, write_isaac_grasps
-    from surehold.grasping.hand import FINGERS, LINKS
 
     def joints(angles: Any) -> dict[str, float]:
-        return {
-            f"{finger}_{link}": float(angles[f, k]) for f, finger in enumerate(FINGERS) for k, link in enumerate(LINKS)
-        }
+        names = problem.simulator.hand.joint_names
+        return {name: float(angle) for name, angle in zip(names, angles.ravel(), strict=True) if name}
 
     stored = []
     for candidate in report.candidates:

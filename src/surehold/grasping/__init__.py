@@ -10,7 +10,9 @@ if TYPE_CHECKING:
     from surehold.grasping.formats import GraspFile, StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
     from surehold.grasping.friction_cones import contact_wrenches, soft_finger_torsion
     from surehold.grasping.grasp import COLLISIONS, STATUSES, Grasp, Simulator
-    from surehold.grasping.hand import Hand, icub_left_hand
+    from surehold.grasping.hand import Hand, Preshape
+    from surehold.grasping.hands import HANDS, hand_named
+    from surehold.grasping.icub_hand import icub_left_hand, icub_right_hand
     from surehold.grasping.inscribed_ball import ball_radius
     from surehold.grasping.linear_programs import force_closure, gravity_wrenches, task_quality
     from surehold.grasping.meshes import OBJECTS, GraspObject, shipped_object
@@ -30,11 +32,13 @@ _HOMES = {
     "Grasp": "grasp",
     "GraspFile": "formats",
     "GraspObject": "meshes",
+    "HANDS": "hands",
     "Hand": "hand",
     "MODES": "poses",
     "OBJECTS": "meshes",
     "ObjectWrenchSpace": "simox",
     "Pose": "poses",
+    "Preshape": "hand",
     "QUALITIES": "quality",
     "STATUSES": "grasp",
     "Scene": "scene",
@@ -50,7 +54,9 @@ _HOMES = {
     "grasp_scene": "scene",
     "grasp_to_dict": "formats",
     "gravity_wrenches": "linear_programs",
-    "icub_left_hand": "hand",
+    "hand_named": "hands",
+    "icub_left_hand": "icub_hand",
+    "icub_right_hand": "icub_hand",
     "object_wrench_space": "simox",
     "read_isaac_grasps": "formats",
     "shipped_object": "meshes",
@@ -66,6 +72,7 @@ __all__ = [
     "COLLISIONS",
     "CONTACT_MODELS",
     "FACETS",
+    "HANDS",
     "MODES",
     "OBJECTS",
     "QUALITIES",
@@ -78,6 +85,7 @@ __all__ = [
     "Hand",
     "ObjectWrenchSpace",
     "Pose",
+    "Preshape",
     "Scene",
     "SceneMesh",
     "Simulator",
@@ -91,7 +99,9 @@ __all__ = [
     "grasp_scene",
     "grasp_to_dict",
     "gravity_wrenches",
+    "hand_named",
     "icub_left_hand",
+    "icub_right_hand",
     "object_wrench_space",
     "read_isaac_grasps",
     "shipped_object",

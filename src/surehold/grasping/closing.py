@@ -27,35 +27,37 @@ from numba import njit
 from numpy.typing import NDArray
 
 from surehold.grasping.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap
-from surehold.grasping.hand import finger_joints
+from surehold.grasping.hand import axis_ends, finger_frames
 
-__all__ = ["CLOSING_MODES", "TOUCH", "Closed", "close_hand", "hand_gaps", "link_ends"]
+__all__ = ["CLOSING_MODES", "TOUCH", "Closed", "close_hand", "hand_gaps"]
 
 CLOSING_MODES: Final = ("adaptive", "synergy")
 TOUCH: Final = 5e-6  #: a smaller gap is a touch [m]
-_LINKS = 20
-_PALM_LINKS = 10  # the middle and distal links of the five fingers can reach the palm
+_PALM_LINK = 2  # from this link on a finger can reach the palm
 
 
 class Closed(NamedTuple):
     """How a hand has closed."""
 
-    joints: NDArray[np.float64]  #: (5, 4) rad
-    touched: NDArray[np.bool_]  #: (20,) which links were stopped by the object
-    pass_time: NDArray[np.float64]  #: (20,) closing parameter of a link's closest approach in passing, infinite if none
-    pass_gap: NDArray[np.float64]  #: (20,) gap there, below `brush` [m]
-    pass_leave: NDArray[np.float64]  #: (20,) largest gap found afterwards [m]
+    joints: NDArray[np.float64]  #: (f, j) rad or m
+    touched: NDArray[np.bool_]  #: (f j,) which links were stopped by the object
+    pass_time: NDArray[np.float64]  #: (f j,) closing parameter of a link's closest approach in passing, or infinity
+    pass_gap: NDArray[np.float64]  #: (f j,) gap there, below `brush` [m]
+    pass_leave: NDArray[np.float64]  #: (f j,) largest gap found afterwards [m]
     looks: int  #: number of gaps computed
 
 
 @njit(cache=True)
 def _finger_at(f, t, bases, chains, motion, stop, ends):
-    """Write the link ends of finger f at time t; motion is (4, 5, 4): start, rate, lower, upper; stop (5, 4)."""
-    q = np.empty(4)
-    for j in range(4):
+    """Write the link ends of finger f at time t; motion is (4, f, j): start, rate, lower, upper; stop (f, j)."""
+    joints = chains.shape[1]
+    q = np.empty(joints)
+    frames = np.empty((joints, 3, 4))
+    for j in range(joints):
         angle = motion[0, f, j] + motion[1, f, j] * min(t, stop[f, j])
         q[j] = min(max(angle, motion[2, f, j]), motion[3, f, j])
-    finger_joints(bases[f], chains[f], q[0], q[1], q[2], q[3], ends)
+    finger_frames(bases[f], chains[f], q, frames)
+    axis_ends(frames, chains[f], ends)
 
 
 @njit(cache=True)
@@ -115,71 +117,69 @@ def _closest(f, k, early, late, nodes, frame, bases, chains, motion, stop, radiu
 
 
 @njit(cache=True)
-def link_ends(bases, chains, angles):
-    """Return the ends of all link axes (20, 2, 3) at joint angles (5, 4)."""
-    ends = np.empty((_LINKS, 2, 3))
-    for f in range(5):
-        finger_joints(
-            bases[f], chains[f], angles[f, 0], angles[f, 1], angles[f, 2], angles[f, 3], ends[4 * f : 4 * f + 4]
-        )
-    return ends
+def hand_gaps(nodes, frame, ends, radii, palms, halves, roundings, enough):
+    """Return the gaps (f j + 1,) between the bodies of a resting hand and the object [m]; the palm is the last one.
 
-
-@njit(cache=True)
-def hand_gaps(nodes, frame, ends, radius, palm, half, rounding, enough):
-    """Return the gaps (21,) between the bodies of a resting hand and the object [m]; the palm is the last one."""
-    gaps = np.empty(_LINKS + 1)
-    for b in range(_LINKS):
-        gaps[b] = capsule_gap(nodes, frame, ends[b, 0], ends[b, 1], radius, 1e-6, 0.0)[0]
-    gaps[_LINKS] = palm_gap(nodes, frame, palm, half, rounding, 1e-5, enough)
+    A link that is not there has an infinite gap.
+    """
+    links = ends.shape[0]
+    gaps = np.full(links + 1, np.inf)
+    for b in range(links):
+        radius = radii[b // radii.shape[1], b % radii.shape[1]]
+        if radius > 0.0:
+            gaps[b] = capsule_gap(nodes, frame, ends[b, 0], ends[b, 1], radius, 1e-6, 0.0)[0]
+    for p in range(palms.shape[0]):
+        gap = palm_gap(nodes, frame, palms[p], halves[p], roundings[p], 1e-5, enough)
+        gaps[links] = min(gaps[links], gap)
     return gaps
 
 
 @njit(cache=True)
-def close_hand(nodes, frame, bases, chains, reach, motion, radius, palm, half, rounding, adaptive, closed, brush, stop):
+def close_hand(
+    nodes, frame, bases, chains, reach, motion, radii, palms, halves, roundings, adaptive, closed, brush, stop
+):
     """Close the hand from its open posture, which must not touch the object.
 
-    Passes nearer than `brush` are reported (0: none). `stop` (5, 4) holds times at which joints are stopped, whatever
+    Passes nearer than `brush` are reported (0: none). `stop` (f, j) holds times at which joints are stopped, whatever
     they touch, infinite for none; it is changed to the times at which they were. Returns the fields of `Closed`.
     """
-    touched = np.zeros(_LINKS, dtype=np.bool_)
-    mine = np.empty((4, 2, 3))
-    other = np.empty((4, 2, 3))
+    fingers, per_finger = radii.shape
+    links = fingers * per_finger
+    touched = np.zeros(links, dtype=np.bool_)
+    mine = np.empty((per_finger, 2, 3))
+    other = np.empty((per_finger, 2, 3))
 
     # The gaps to watch: link - object, link - palm, link - link of another finger.
-    n_pairs = 10 * 16
-    total = _LINKS + _PALM_LINKS + n_pairs
-    first = np.empty(total, dtype=np.int64)
-    second = np.full(total, -1, dtype=np.int64)  # -1 the object, -2 the palm, else a link
-    n = 0
-    for b in range(_LINKS):
-        first[n] = b
-        n += 1
-    for f in range(5):
-        for k in range(2, 4):
-            first[n], second[n] = 4 * f + k, -2
-            n += 1
-    for f in range(5):
-        for g in range(f + 1, 5):
-            for k in range(4):
-                for m in range(4):
-                    first[n], second[n] = 4 * f + k, 4 * g + m
-                    n += 1
+    most = links * (1 + palms.shape[0]) + links * links // 2
+    first = np.empty(most, dtype=np.int64)
+    second = np.full(most, -1, dtype=np.int64)  # -1 the object, -2 - p box p of the palm, else a link
+    total = 0
+    for b in range(links):
+        f, k = b // per_finger, b % per_finger
+        if radii[f, k] <= 0.0:
+            continue
+        first[total] = b
+        total += 1
+        for p in range(palms.shape[0] if k >= _PALM_LINK else 0):
+            first[total], second[total] = b, -2 - p
+            total += 1
+        for c in range((f + 1) * per_finger, links):
+            if radii[c // per_finger, c % per_finger] > 0.0:
+                first[total], second[total] = b, c
+                total += 1
     open_until = np.empty(total)
     resting = np.zeros(total, dtype=np.bool_)  # not looked at yet: at the first look a touch between neighbors is rest
     for i in range(total):
-        until = _begins(first[i] // 4, first[i] % 4, motion, stop)
+        until = _begins(first[i] // per_finger, first[i] % per_finger, motion, stop)
         if second[i] >= 0:
-            until = min(until, _begins(second[i] // 4, second[i] % 4, motion, stop))
-            resting[i] = True
-        elif second[i] == -2:
-            resting[i] = True
+            until = min(until, _begins(second[i] // per_finger, second[i] % per_finger, motion, stop))
+        resting[i] = second[i] != -1
         open_until[i] = until
-    pass_time = np.full(_LINKS, np.inf)
-    pass_gap = np.full(_LINKS, np.inf)
-    pass_leave = np.zeros(_LINKS)
-    looked = np.full((_LINKS, 2), np.inf)  # gap at the last look and at the one before
-    times = np.zeros((_LINKS, 2))
+    pass_time = np.full(links, np.inf)
+    pass_gap = np.full(links, np.inf)
+    pass_leave = np.zeros(links)
+    looked = np.full((links, 2), np.inf)  # gap at the last look and at the one before
+    times = np.zeros((links, 2))
     looks = 0
     while True:
         i = 0
@@ -190,22 +190,24 @@ def close_hand(nodes, frame, bases, chains, reach, motion, radius, palm, half, r
         if t >= closed:
             break
         a, b = first[i], second[i]
-        fa, ka = a // 4, a % 4
+        fa, ka = a // per_finger, a % per_finger
         v = _speed(fa, ka, t, motion, stop, reach)
         if b >= 0:
-            v += _speed(b // 4, b % 4, t, motion, stop, reach)
+            v += _speed(b // per_finger, b % per_finger, t, motion, stop, reach)
         if v == 0.0:
             open_until[i] = np.inf
             continue
         looks += 1
+        radius = radii[fa, ka]
         _finger_at(fa, t, bases, chains, motion, stop, mine)
         if b == -1:
             gap = capsule_gap(nodes, frame, mine[ka, 0], mine[ka, 1], radius, 0.2 * TOUCH, 0.2)[0]
-        elif b == -2:
-            gap = box_gap(palm, half, rounding, mine[ka, 0], mine[ka, 1], radius)
+        elif b < -1:
+            gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[ka, 0], mine[ka, 1], radius)
         else:
-            _finger_at(b // 4, t, bases, chains, motion, stop, other)
-            gap = capsule_pair_gap(mine[ka, 0], mine[ka, 1], other[b % 4, 0], other[b % 4, 1], 2.0 * radius)
+            fb, kb = b // per_finger, b % per_finger
+            _finger_at(fb, t, bases, chains, motion, stop, other)
+            gap = capsule_pair_gap(mine[ka, 0], mine[ka, 1], other[kb, 0], other[kb, 1], radius + radii[fb, kb])
         if b == -1 and brush > 0.0:
             pass_leave[a] = max(pass_leave[a], gap)
             if looked[a, 0] < 1.5 * brush and looked[a, 0] <= looked[a, 1] and looked[a, 0] < gap:
@@ -229,13 +231,14 @@ def close_hand(nodes, frame, bases, chains, reach, motion, radius, palm, half, r
         for body in (a, b):
             if body < 0:
                 continue
-            f, last = body // 4, (body % 4 if adaptive else 3)
-            if _speed(f, body % 4, t, motion, stop, reach) > 0.0:
+            f, k = body // per_finger, body % per_finger
+            last = k if adaptive else per_finger - 1
+            if _speed(f, k, t, motion, stop, reach) > 0.0:
                 for j in range(last + 1):
                     stop[f, j] = min(stop[f, j], t)
-    joints = np.empty((5, 4))
-    for f in range(5):
-        for j in range(4):
+    joints = np.empty((fingers, per_finger))
+    for f in range(fingers):
+        for j in range(per_finger):
             angle = motion[0, f, j] + motion[1, f, j] * min(closed, stop[f, j])
             joints[f, j] = min(max(angle, motion[2, f, j]), motion[3, f, j])
     return joints, touched, pass_time, pass_gap, pass_leave, looks

@@ -29,9 +29,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from surehold.grasping.clearance import capsule_gap
-from surehold.grasping.closing import link_ends
 from surehold.grasping.distance_field import field_distance, field_distance_gradient
-from surehold.grasping.hand import PALM, Hand, link_name
+from surehold.grasping.hand import Hand, link_frames
 
 __all__ = [
     "CONTACT_MODELS",
@@ -62,12 +61,8 @@ class Contacts:
     points: NDArray[np.float64] = field(repr=False)  #: (c, 3) on the object's surface [m]
     normals: NDArray[np.float64] = field(repr=False)  #: (c, 3) unit length, into the object
     weights: NDArray[np.float64] = field(repr=False)  #: (c,) in (0, 1]
-    bodies: NDArray[np.int64] = field(repr=False)  #: (c,) number of the touching body, 4 finger + link; the palm is 20
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of the touching body of each contact, such as "thumb distal" or "palm"."""
-        return tuple(link_name(int(body)) for body in self.bodies)
+    bodies: NDArray[np.int64] = field(repr=False)  #: (c,) number of the touching body of the hand
+    names: tuple[str, ...] = field(repr=False, default=())  #: (c,) its name, such as "thumb distal" or "palm"
 
     def __len__(self) -> int:
         return len(self.points)
@@ -88,13 +83,14 @@ def _put(rows, n, nodes, frame, x, y, z, weight, body):
 
 
 @njit(cache=True)
-def touch_contacts(nodes, frame, ends, touched, radius):
+def touch_contacts(nodes, frame, ends, touched, radii):
     """Return one contact (c, 8) for each link that touched: point, inward normal, weight 1, body."""
-    rows = np.empty((20, 8))
+    rows = np.empty((touched.size, 8))
     n = 0
-    for body in range(20):
+    for body in range(touched.size):
         if touched[body]:
             near, far = ends[body, 0], ends[body, 1]
+            radius = radii[body // radii.shape[1], body % radii.shape[1]]
             s = capsule_gap(nodes, frame, near, far, radius, 1e-7, 0.0)[1]
             p = near + s * (far - near)
             n = _put(rows, n, nodes, frame, p[0], p[1], p[2], 1.0, body)
@@ -119,7 +115,7 @@ def link_samples(radius: float, length: float, round_end: bool) -> Array:
 
 
 def palm_samples(half: Array, rounding: float) -> Array:
-    """Return skin samples (m, 6) of the flat inner face of the palm, in its box's frame: place and outward normal."""
+    """Return skin samples (m, 6) of the flat face of a palm's box towards its +z: place and outward normal."""
     reach = half[:2] - rounding
     u, v = (r * np.linspace(-1.0, 1.0, int(np.ceil(2.0 * r / PALM_PITCH)) + 1) for r in reach)
     place = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -130,49 +126,99 @@ def palm_samples(half: Array, rounding: float) -> Array:
 def skin_samples(hand: Hand) -> Array:
     """Return all skin samples (m, 7) of a hand: number of the body; place [m] and outward normal in its frame.
 
-    The frame of a link has its origin at the near end and z along the link, that of the palm is its box's.
+    The frame of a link is that of the joint that moves it. Samples inside another capsule of the same rigid link, and
+    samples of the palm inside another box of it, are left out.
     """
-    lengths = np.linalg.norm(
-        np.diff(link_ends(hand.bases, hand.chains, 0.5 * (hand.lower + hand.upper)), axis=1), axis=2
-    )
-    parts = [link_samples(hand.radius, float(lengths[body, 0]), body % 4 == 3) for body in range(PALM)]
-    parts.append(palm_samples(hand.palm_half_extents, hand.palm_rounding))
-    return np.vstack([np.column_stack([np.full(len(part), body), part]) for body, part in enumerate(parts)])
+    parts: list[Array] = []
+    fingers, joints = hand.radii.shape
+    for f in range(fingers):
+        present = np.flatnonzero(hand.radii[f] > 0.0)
+        moving = np.flatnonzero(hand.upper[f] > hand.lower[f])
+        last = moving[-1] if len(moving) else 0
+        for k in present:
+            near = hand.chains[f, k, 1:4]
+            axes, length = _link_axes(hand, f, int(k))
+            local = link_samples(float(hand.radii[f, k]), length, bool(k >= last))
+            place, normal = near + local[:, :3] @ axes.T, local[:, 3:] @ axes.T
+            parts.append(np.column_stack([np.full(len(place), f * joints + k), place, normal]))
+    for pose, half, rounding in zip(hand.palm_poses, hand.palm_half_extents, hand.palm_roundings, strict=True):
+        towards = int(np.argmax(np.abs(pose[2, :3])))  # the axis of the box that looks out of the palm
+        turn = np.roll(np.eye(3), towards - 2, axis=1) if towards != 2 else np.eye(3)
+        turn = turn * np.array([1.0, 1.0, 1.0 if pose[2, towards] > 0.0 else -1.0])
+        local = palm_samples(np.abs(half @ turn), float(rounding))
+        place, normal = pose[:, 3] + local[:, :3] @ (pose[:, :3] @ turn).T, local[:, 3:] @ (pose[:, :3] @ turn).T
+        parts.append(np.column_stack([np.full(len(place), hand.palm), place, normal]))
+    samples = np.vstack(parts)
+    return samples[~_buried(hand, samples)]
+
+
+def _link_axes(hand: Hand, f: int, k: int) -> tuple[Array, float]:
+    """Return the axes (3, 3) of a link's samples, z along the link and x along its bending axis, and its length."""
+    along = hand.chains[f, k, 4:7] - hand.chains[f, k, 1:4]
+    length = float(np.linalg.norm(along))
+    z = along / length
+    side = np.array([0.0, 0.0, 1.0])
+    if k == 0 and hand.radii.shape[1] > 1:  # the first joint spreads the finger, the second one bends it
+        side = hand.chains[f, 0, 7:].reshape(3, 4)[:, 2]
+    side = side - (side @ z) * z
+    if np.linalg.norm(side) < 0.1:
+        side = np.eye(3)[int(np.argmin(np.abs(z)))]
+        side = side - (side @ z) * z
+    x = side / np.linalg.norm(side)
+    return np.column_stack([x, np.cross(z, x), z]), length
+
+
+def _buried(hand: Hand, samples: Array) -> NDArray[np.bool_]:
+    """Return which samples (m, 7) lie inside another capsule of the same rigid link, or box of the palm."""
+    fingers, joints = hand.radii.shape
+    rest = 0.5 * (hand.lower + hand.upper)
+    frames = link_frames(hand.bases, hand.chains, rest)
+    rigid = np.cumsum(hand.upper > hand.lower, axis=1)  # links of a finger with the same number move together
+    body = samples[:, 0].astype(int)
+    buried = np.zeros(len(samples), dtype=bool)
+    for f in range(fingers):
+        for k in range(joints):
+            group = [f * joints + m for m in range(joints) if m != k and rigid[f, m] == rigid[f, k]]
+            mine = np.flatnonzero(np.isin(body, group))
+            if not len(mine) or hand.radii[f, k] <= 0.0:
+                continue
+            placed = np.einsum("mij,mj->mi", frames[body[mine], :, :3], samples[mine, 1:4]) + frames[body[mine], :, 3]
+            near, far = (frames[f * joints + k] @ np.append(hand.chains[f, k, i : i + 3], 1.0) for i in (1, 4))
+            share = np.clip((placed - near) @ (far - near) / ((far - near) @ (far - near)), 0.0, 1.0)
+            away = np.linalg.norm(placed - near - share[:, None] * (far - near), axis=1)
+            buried[mine] |= away < hand.radii[f, k] - 1e-6
+    mine = np.flatnonzero(body == hand.palm)
+    for pose, half in zip(hand.palm_poses, hand.palm_half_extents, strict=True):
+        inside = np.abs((samples[mine, 1:4] - pose[:, 3]) @ pose[:, :3]) < half - 1e-6
+        buried[mine] |= np.all(inside, axis=1)
+    return buried
 
 
 @njit(cache=True)
-def skin_contacts(nodes, frame, ends, sides, radius, palm, samples, depth, skin, graded):
+def skin_contacts(nodes, frame, frames, chains, radii, palm, samples, depth, skin, graded):
     """Return contacts (m, 8) of all skin samples (m, 7): point, inward normal, weight, body.
 
     The weight of a sample that is not nearer than `depth` is 0, and so are its point and normal.
-    `sides` (5, 3) is the bending axis of each finger: the x axis of its links' frames is it, without its part along z.
+    `frames` (f j, 3, 4) are the moved frames of the joints, `palm` (3, 4) is the palm frame.
     """
-    pose = np.empty((21, 3, 4))
-    away = np.zeros(21, dtype=np.bool_)
+    links, joints = frames.shape[0], chains.shape[1]
+    pose = np.empty((links + 1, 3, 4))
+    away = np.zeros(links + 1, dtype=np.bool_)
     for i in range(3):
         for j in range(4):
-            pose[PALM, i, j] = palm[i, j]
-    for body in range(PALM):
-        length, lean, size = 0.0, 0.0, 0.0
-        for i in range(3):
-            pose[body, i, 3] = ends[body, 0, i]
-            pose[body, i, 2] = ends[body, 1, i] - ends[body, 0, i]
-            length += pose[body, i, 2] ** 2
-        length = np.sqrt(length)
-        for i in range(3):
-            pose[body, i, 2] /= length
-            lean += pose[body, i, 2] * sides[body // 4, i]
-        for i in range(3):
-            pose[body, i, 0] = sides[body // 4, i] - lean * pose[body, i, 2]
-            size += pose[body, i, 0] ** 2
-        size = np.sqrt(size)
-        for i in range(3):
-            pose[body, i, 0] /= size
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            pose[body, i, 1] = pose[body, j, 2] * pose[body, k, 0] - pose[body, k, 2] * pose[body, j, 0]
-        x, y, z = (pose[body, 0, 3], pose[body, 1, 3], pose[body, 2, 3])
-        away[body] = field_distance(nodes, frame, x, y, z) > length + radius + depth
+            pose[links, i, j] = palm[i, j]
+            for body in range(links):
+                pose[body, i, j] = frames[body, i, j]
+    for body in range(links):
+        row = chains[body // joints, body % joints]
+        x, y, z, length = pose[body, 0, 3], pose[body, 1, 3], pose[body, 2, 3], 0.0
+        for i in range(3):  # at the near end of the link's axis
+            x += pose[body, 0, i] * row[1 + i]
+            y += pose[body, 1, i] * row[1 + i]
+            z += pose[body, 2, i] * row[1 + i]
+            length += (row[4 + i] - row[1 + i]) ** 2
+        reach = np.sqrt(length) + radii[body // joints, body % joints] + depth
+        away[body] = field_distance(nodes, frame, x, y, z) > reach
     rows = np.zeros((samples.shape[0], 8))
     for m in range(samples.shape[0]):
         body = int(samples[m, 0])
@@ -216,7 +262,9 @@ def blended(branches: Sequence[tuple[float, Array]]) -> Array:
     return mixed
 
 
-def as_contacts(rows: NDArray[np.float64]) -> Contacts:
+def as_contacts(rows: NDArray[np.float64], hand: Hand) -> Contacts:
     """Return the rows (c, 8) of the compiled functions as `Contacts`; rows of weight zero are left out."""
     rows = rows[rows[:, 6] > 0.0]
-    return Contacts(rows[:, :3].copy(), rows[:, 3:6].copy(), rows[:, 6].copy(), rows[:, 7].astype(np.int64))
+    bodies = rows[:, 7].astype(np.int64)
+    names = tuple(hand.body_name(int(body)) for body in bodies)
+    return Contacts(rows[:, :3].copy(), rows[:, 3:6].copy(), rows[:, 6].copy(), bodies, names)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.closing import CLOSING_MODES, Closed, close_hand, hand_gaps, link_ends
+from surehold.grasping.closing import CLOSING_MODES, Closed, close_hand, hand_gaps
 from surehold.grasping.contacts import (
     CONTACT_MODELS,
     DEPTH,
@@ -21,11 +21,12 @@ from surehold.grasping.contacts import (
     touch_contacts,
 )
 from surehold.grasping.distance_field import DistanceField, distance_field_of
-from surehold.grasping.hand import Hand, hand_named, link_name
+from surehold.grasping.hand import CLOSED, Hand, link_ends, link_frames
+from surehold.grasping.hands import hand_named
 from surehold.grasping.meshes import GraspObject, shipped_object
 from surehold.grasping.poses import Pose
 from surehold.grasping.quality import Measure
-from surehold.grasping.synergy import CLOSED, ClosingMotion, power_grasp
+from surehold.grasping.synergy import ClosingMotion, closing_motion, preshape_of
 from surehold.grasping.wrench_space import WrenchQuality
 
 if TYPE_CHECKING:
@@ -55,7 +56,6 @@ THESIS: Final = {
 _PENALTY: Final = 0.05  # at the deepest penetration: half of a good epsilon
 _PENALTY_DEPTH: Final = 0.02  # depths of all bodies together at which the penalty is 63 % of that [m]
 _LEAST_SHARE: Final = 1e-3  # outcomes of a smaller share are not looked at
-_NO_CONTACTS: Final = as_contacts(np.empty((0, 8)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +68,8 @@ class Grasp:
     s1: float  #: posture variable [rad]
     joints: Array = field(
         repr=False
-    )  #: (5, 4) joint angles at the end, index to thumb [rad]; a collision leaves it open
-    open_joints: Array = field(repr=False)  #: (5, 4) joint angles of the open hand [rad]
+    )  #: (f, j) joint angles [rad] or shifts [m] at the end, in the hand's order; a collision leaves it open
+    open_joints: Array = field(repr=False)  #: (f, j) joint angles or shifts of the open hand
     contacts: Contacts = field(repr=False)  #: of the quality; empty after a collision
     touching: tuple[str, ...] = field(repr=False)  #: names of the links that were stopped by the object
     penetration: float  #: how deep the open hand is inside the object [m]; 0 without a collision
@@ -79,9 +79,9 @@ class Grasp:
 class _Geometry(NamedTuple):
     """The hand in the object's frame, as the compiled functions take it."""
 
-    bases: Array  # (5, 3, 4)
-    palm: Array  # (3, 4) frame of the palm's box
-    sides: Array  # (5, 3) bending axes
+    bases: Array  # (f, 3, 4)
+    palm: Array  # (3, 4) palm frame
+    palms: Array  # (p, 3, 4) frames of the palm's boxes
 
 
 class Simulator:
@@ -90,7 +90,7 @@ class Simulator:
     Parameters
     ----------
     hand
-        A `Hand` or its name, "icub-left".
+        A `Hand` or the name of a shipped one: "icub-left", "icub-right".
     obj
         A `GraspObject` or the name of a shipped one: "mug", "bottle", "glass", "drill".
     contact
@@ -100,6 +100,8 @@ class Simulator:
         of the wrenches), "signed_epsilon", "volume", "simox", "task" or "closure".
     closing
         "adaptive" (links beyond a touching one go on) or "synergy" (a touch stops the whole finger).
+    preshape
+        Type of grasp, one of the hand's `preshapes`; the first one if not given ("power" for the iCub).
     friction
         Coefficient of friction; the object's own if not given.
     torsion
@@ -142,6 +144,7 @@ class Simulator:
         contact: str = "graded",
         quality: str = "epsilon",
         closing: str = "adaptive",
+        preshape: str | None = None,
         friction: float | None = None,
         torsion: float = 0.0,
         cones: Literal["polyhedral", "round"] = "round",
@@ -163,6 +166,8 @@ class Simulator:
         self.contact: Final = contact
         self.quality: Final = quality
         self.closing: Final = closing
+        preshape_of(self.hand, preshape)
+        self.preshape: Final = preshape or next(iter(self.hand.preshapes))
         self.collision: Final = collision
         self.friction: Final[float] = self.object.friction if friction is None else float(friction)
         self.measure: Final = Measure(
@@ -175,6 +180,7 @@ class Simulator:
         self.field: Final[DistanceField] = distance_field_of(self.object)
         self._reach: Final[Array] = self.hand.reach()
         self._samples: Final[Array] = skin_samples(self.hand)
+        self._no_contacts: Final = as_contacts(np.empty((0, 8)), self.hand)
 
     def grasp(self, pose: Pose, s1: float = 0.0) -> Grasp:
         """Close the hand at a pose of its palm in the world with posture s1 [rad]; a bad grasp has quality 0.
@@ -187,17 +193,17 @@ class Simulator:
         if not np.isfinite(s1) or not np.all(np.isfinite([*pose.position, *pose.quaternion])):
             raise InputError(f"pose {pose} with s1 = {s1!r} is not finite; give finite numbers.")
         relative = self.object_pose.inverse() @ pose
-        motion = power_grasp(self.hand, float(s1))
+        motion = closing_motion(self.hand, float(s1), self.preshape)
         geometry = self._place(relative)
         opened = motion.joints(0.0)
         depths = np.maximum(-self.gaps(relative, opened, geometry), 0.0)
         penetration = float(depths.max())
         if penetration > 0.0:
             worth = self._collision(float(depths.sum()))
-            return Grasp("initial collision", worth, relative, s1, opened, opened, _NO_CONTACTS, (), penetration)
+            return Grasp("initial collision", worth, relative, s1, opened, opened, self._no_contacts, (), penetration)
         closed = self._close(geometry, motion)
         contacts = self._contacts(geometry, motion, closed)
-        touching = tuple(link_name(int(body)) for body in np.flatnonzero(closed.touched))
+        touching = tuple(dict.fromkeys(self.hand.body_name(int(body)) for body in np.flatnonzero(closed.touched)))
         if len(contacts) < 2:
             return Grasp("no contact", 0.0, relative, s1, closed.joints, opened, contacts, touching, 0.0)
         wrench = self.measure.wrench(contacts)
@@ -206,7 +212,7 @@ class Simulator:
         return Grasp(status, worth, relative, s1, closed.joints, opened, contacts, touching, 0.0, wrench)
 
     def gaps(self, pose: Pose, joints: ArrayLike, geometry: _Geometry | None = None) -> Array:
-        """Return the gaps (21,) between the object and the hand's bodies at rest [m], the palm last.
+        """Return the gaps (f j + 1,) between the object and the hand's bodies at rest [m], the palm last.
 
         Negative values are rough depths; gaps above 5 mm are lower bounds.
 
@@ -215,7 +221,7 @@ class Simulator:
         pose
             From the palm frame to the object's frame.
         joints
-            Joint angles, (5, 4) [rad].
+            Joint angles or shifts, (f, j) [rad or m].
         """
         placed = self._place(pose) if geometry is None else geometry
         angles = np.ascontiguousarray(joints, dtype=np.float64)
@@ -224,10 +230,10 @@ class Simulator:
             self.field.nodes,
             self.field.frame,
             ends,
-            self.hand.radius,
-            placed.palm,
+            self.hand.radii,
+            placed.palms,
             self.hand.palm_half_extents,
-            self.hand.palm_rounding,
+            self.hand.palm_roundings,
             0.005,
         )
 
@@ -235,7 +241,7 @@ class Simulator:
         """Compile what a trial needs, if it is not yet in the cache: some seconds once for an installation."""
         half = self.object.box_half_extents
         beside = Pose((float(-self.hand.grasp_center[0]), 0.0, float(self.object.box_center[2] - half[2] - 0.05)))
-        motion = power_grasp(self.hand)
+        motion = closing_motion(self.hand, 0.0, self.preshape)
         geometry = self._place(beside)
         closed = self._close(geometry, motion)
         self.gaps(beside, closed.joints, geometry)
@@ -243,7 +249,7 @@ class Simulator:
         self._skin(geometry, closed.joints)
         self._touch(geometry, closed)
         points = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
-        self.measure.wrench(Contacts(points, -points, np.ones(4), np.arange(4)))
+        self.measure.wrench(Contacts(points, -points, np.ones(4), np.arange(4), ("",) * 4))
 
     def scene(self, grasp: Grasp, opened: bool = False) -> "Scene":
         """Return the meshes and contacts of a grasp in the world; with `opened`, of the hand before it closes."""
@@ -260,9 +266,10 @@ class Simulator:
         bases = np.concatenate(
             [r @ self.hand.bases[:, :, :3], (self.hand.bases[:, :, 3] @ r.T + p)[:, :, None]], axis=2
         )
-        palm = np.column_stack([r, r @ self.hand.palm_center + p])
-        # A finger bends about its base's -y; that abduction turns it by a few degrees is of no matter here.
-        return _Geometry(np.ascontiguousarray(bases), palm, np.ascontiguousarray(-bases[:, :, 1]))
+        palms = np.concatenate(
+            [r @ self.hand.palm_poses[:, :, :3], (self.hand.palm_poses[:, :, 3] @ r.T + p)[:, :, None]], axis=2
+        )
+        return _Geometry(np.ascontiguousarray(bases), np.column_stack([r, p]), np.ascontiguousarray(palms))
 
     def _close(self, geometry: _Geometry, motion: ClosingMotion, stop: Array | None = None) -> Closed:
         return Closed(
@@ -273,29 +280,30 @@ class Simulator:
                 self.hand.chains,
                 self._reach,
                 np.stack(motion),
-                self.hand.radius,
-                geometry.palm,
+                self.hand.radii,
+                geometry.palms,
                 self.hand.palm_half_extents,
-                self.hand.palm_rounding,
+                self.hand.palm_roundings,
                 self.closing == "adaptive",
                 CLOSED,
                 self.depth if self.contact == "graded" else 0.0,
-                np.full((5, 4), np.inf) if stop is None else stop,
+                np.full(self.hand.radii.shape, np.inf) if stop is None else stop,
             )
         )
 
     def _contacts(self, geometry: _Geometry, motion: ClosingMotion, closed: Closed) -> Contacts:
         if self.contact == "single":
-            return as_contacts(self._touch(geometry, closed))
+            return as_contacts(self._touch(geometry, closed), self.hand)
         rows = self._skin(geometry, closed.joints)
         if self.contact == "graded":
             bodies = self._samples[:, 0]
-            for f in range(5):
+            joints = self.hand.radii.shape[1]
+            for f in range(len(self.hand.radii)):
                 branches = self._branches(geometry, motion, closed, f, 0.0)
                 if len(branches) > 1:
-                    mine = (bodies >= 4 * f) & (bodies < 4 * f + 4)
-                    rows[mine] = blended([(share, self._skin(geometry, joints)[mine]) for share, joints in branches])
-        return as_contacts(rows)
+                    mine = (bodies >= joints * f) & (bodies < joints * (f + 1))
+                    rows[mine] = blended([(share, self._skin(geometry, angles)[mine]) for share, angles in branches])
+        return as_contacts(rows, self.hand)
 
     def _branches(
         self, geometry: _Geometry, motion: ClosingMotion, closed: Closed, finger: int, after: float
@@ -303,15 +311,16 @@ class Simulator:
         """Return share and joint angles of each outcome of a finger: held where a link brushes past, or gone on."""
         branches: list[tuple[float, Array]] = []
         left = 1.0
-        links = range(4 * finger, 4 * finger + 4)
+        per_finger = self.hand.radii.shape[1]
+        links = range(per_finger * finger, per_finger * (finger + 1))
         for time, link in sorted(
             (float(closed.pass_time[b]), b) for b in links if after < closed.pass_time[b] < CLOSED
         ):
             share = left * pass_share(float(closed.pass_gap[link]), float(closed.pass_leave[link]), self.depth)
             if share < _LEAST_SHARE:
                 continue
-            stop = np.full((5, 4), np.inf)
-            stop[finger, : (link % 4 + 1 if self.closing == "adaptive" else 4)] = time
+            stop = np.full(self.hand.radii.shape, np.inf)
+            stop[finger, : (link % per_finger + 1 if self.closing == "adaptive" else per_finger)] = time
             held = self._close(geometry, motion, stop)
             branches += [(share * s, joints) for s, joints in self._branches(geometry, motion, held, finger, time)]
             left -= share
@@ -319,15 +328,15 @@ class Simulator:
 
     def _touch(self, geometry: _Geometry, closed: Closed) -> Array:
         ends = link_ends(geometry.bases, self.hand.chains, closed.joints)
-        return touch_contacts(self.field.nodes, self.field.frame, ends, closed.touched, self.hand.radius)
+        return touch_contacts(self.field.nodes, self.field.frame, ends, closed.touched, self.hand.radii)
 
     def _skin(self, geometry: _Geometry, joints: Array) -> Array:
         return skin_contacts(
             self.field.nodes,
             self.field.frame,
-            link_ends(geometry.bases, self.hand.chains, joints),
-            geometry.sides,
-            self.hand.radius,
+            link_frames(geometry.bases, self.hand.chains, joints),
+            self.hand.chains,
+            self.hand.radii,
             geometry.palm,
             self._samples,
             self.depth,

@@ -1,161 +1,156 @@
-"""The hand: a palm and five fingers of four revolute joints each, with compiled forward kinematics.
+"""The hand: a palm and fingers that are chains of joints and capsules, with compiled forward kinematics.
 
-    q      joint angles, (5, 4), rad           a    actuator angles, (9,), rad
-    R, p   rotation and origin of a joint's frame; every joint turns about its own z axis
+    f, j    fingers, joints of a finger (padded to the longest)      q     joint angles or shifts, (f, j), rad or m
+    R, p    rotation and origin of a joint's frame; every joint turns about, or slides along, its own z axis
 
-One finger is the chain (Denavit-Hartenberg, all lengths in m)
-
-    base -> Rz(q1) -> Tx(a1) Rx(90 deg) Tz(d) -> Rz(q2) -> Tx(a2) -> Rz(q3) -> Tx(a3) -> Rz(q4) -> tip
-
-and its four links (knuckle, proximal, middle, distal) are capsules around the segments between the joints.
-The palm frame: x along the fingers, y towards the thumb, z out of the palm, towards what is grasped.
+One finger is the chain   base -> joint 1 -> offset 1 -> joint 2 -> offset 2 -> ... , and each joint moves one link: a
+capsule around a segment that is fixed in the joint's moved frame. A link of several capsules, or a finger shorter than
+the others, has joints that do not move; a link of radius 0 is not there. Link k of finger f is body j f + k, the palm,
+which may be several boxes with round edges, is the last body.
+The palm frame: x along the fingers, y towards the thumb of a left hand, z out of the palm, towards what is grasped.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
-from typing import Final
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from surehold.errors import unknown_name
-
-__all__ = ["FINGERS", "LINKS", "PALM", "Hand", "finger_joints", "hand_named", "icub_left_hand", "link_name"]
+__all__ = ["CLOSED", "Hand", "Preshape", "chain_row", "finger_frames", "link_ends", "link_frames"]
 
 Array = NDArray[np.float64]
 
-FINGERS: Final = ("index", "middle", "ring", "little", "thumb")
-LINKS: Final = ("knuckle", "proximal", "middle", "distal")
-PALM: Final = 20  #: body number of the palm; a link has the number 4 finger + link
+CLOSED = 2.0 * np.pi  #: the closing parameter of the closed hand; 0 is the open one
+_ROW = 19  # numbers that describe a joint and its link
 
 
-def link_name(body: int) -> str:
-    """Return the name of a body: "palm", or such as "index distal"."""
-    return "palm" if body == PALM else f"{FINGERS[body // 4]} {LINKS[body % 4]}"
+class Preshape(NamedTuple):
+    """How a hand closes in a type of grasp: q(t) = clip(start + s1 posture + rate t, lower, upper) 0 <= t <= 2 pi."""
+
+    start: Array  #: (f, j) rad or m, before clamping
+    rate: Array  #: (f, j) per unit of t
+    posture: Array  #: (f, j) per unit of the posture variable s1
+    s1_useful: tuple[float, float]  #: where s1 has an effect; both ends 0 for a preshape without posture
+    s1_range: tuple[float, float]  #: range of s1 in the thesis preset
+    s1_tries: tuple[float, ...]  #: values that the search of default poses tries
 
 
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """Geometry, joint ranges and coupling of a five-finger hand. Lengths in m, angles in rad, in the palm frame."""
+    """Geometry, joint ranges and preshapes of a hand. Lengths in m, angles in rad, in the palm frame."""
 
     name: str
-    bases: Array = field(repr=False)  #: (5, 3, 4) rotation and origin of each finger's first joint
-    chains: Array = field(repr=False)  #: (5, 6): a1, d, a2, a3 and the far end (x, y) of the distal link's axis
-    lower: Array = field(repr=False)  #: (5, 4) joint angles
-    upper: Array = field(repr=False)  #: (5, 4) joint angles
-    coupling: Array = field(repr=False)  #: (5, 4, 9): q = coupling a, then clamped to the range
-    radius: float  #: of the links' capsules
-    palm_center: Array  #: (3,) center of the palm's box
-    palm_half_extents: Array  #: (3,) of the palm's box, its rounding included
-    palm_rounding: float  #: radius of the palm's edges
+    bases: Array = field(repr=False)  #: (f, 3, 4) rotation and origin of each finger's first joint
+    chains: Array = field(repr=False)  #: (f, j, 19): rows of `chain_row`
+    radii: Array = field(repr=False)  #: (f, j) of the links' capsules; 0 where there is no link
+    lower: Array = field(repr=False)  #: (f, j) joint angles or shifts
+    upper: Array = field(repr=False)  #: (f, j) joint angles or shifts
+    palm_poses: Array = field(repr=False)  #: (p, 3, 4) frames of the palm's boxes
+    palm_half_extents: Array = field(repr=False)  #: (p, 3) of the palm's boxes, their rounding included
+    palm_roundings: Array = field(repr=False)  #: (p,) radius of the palm's edges
     grasp_center: Array  #: (3,) the point that the default pose puts before the center of the object's facet
+    finger_names: tuple[str, ...]  #: (f,)
+    link_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index distal"
+    joint_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index_distal"; "" for one that does not move
+    preshapes: Mapping[str, Preshape] = field(repr=False)  #: grasp types; the first one is the default
+
+    @property
+    def palm(self) -> int:
+        """Body number of the palm."""
+        return len(self.link_names)
+
+    def body_name(self, body: int) -> str:
+        """Return the name of a body: "palm", or such as "index distal"."""
+        return "palm" if body == self.palm else self.link_names[body]
 
     def reach(self) -> Array:
-        """Return (5, 4, 4): for finger f, joint j, link k >= j an upper bound of |joint origin - point of the link|."""
-        lengths = np.column_stack(
-            [
-                np.hypot(self.chains[:, 0], self.chains[:, 1]),
-                self.chains[:, 2],
-                self.chains[:, 3],
-                np.linalg.norm(self.chains[:, 4:], axis=1),
-            ]
-        )
-        reach = np.zeros((5, 4, 4))
-        for j in range(4):
-            reach[:, j, j:] = np.cumsum(lengths[:, j:], axis=1)
+        """Return (f, j, j): an upper bound of the speed of link k when joint i <= k moves at 1 [m/rad, or 1 in m/m].
+
+        For a turning joint that is how far the link's axis can ever be from the joint's origin.
+        """
+        near, far = np.linalg.norm(self.chains[:, :, 1:4], axis=2), np.linalg.norm(self.chains[:, :, 4:7], axis=2)
+        slides = self.chains[:, :, 0] > 0.0
+        travel = np.where(slides, np.maximum(np.abs(self.lower), np.abs(self.upper)), 0.0)
+        offsets = np.linalg.norm(self.chains[:, :, 7:].reshape(*self.radii.shape, 3, 4)[:, :, :, 3], axis=2)
+        fingers, joints = self.radii.shape
+        reach = np.zeros((fingers, joints, joints))
+        for i in range(joints):
+            way = np.zeros(fingers)
+            for k in range(i, joints):
+                if k > i:
+                    way = way + offsets[:, k - 1] + travel[:, k]
+                reach[:, i, k] = np.where(slides[:, i], 1.0, way + np.maximum(near[:, k], far[:, k]))
         return reach
 
 
-def _frame(x: float, y: float, z: float, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Array:
-    """Return (3, 4): Rz(yaw) Ry(pitch) Rx(roll) [degrees] and the origin [mm -> m]."""
-    r, p, w = np.radians([roll, pitch, yaw])
-    about_x = np.array([[1, 0, 0], [0, np.cos(r), -np.sin(r)], [0, np.sin(r), np.cos(r)]])
-    about_y = np.array([[np.cos(p), 0, np.sin(p)], [0, 1, 0], [-np.sin(p), 0, np.cos(p)]])
-    about_z = np.array([[np.cos(w), -np.sin(w), 0], [np.sin(w), np.cos(w), 0], [0, 0, 1]])
-    return np.column_stack([about_z @ about_y @ about_x, np.array([x, y, z]) * 1e-3])
+def chain_row(near: Array, far: Array, offset: Array, slides: bool = False) -> Array:
+    """Return the 19 numbers of a joint: whether it slides, its link's near and far end, the frame of the next joint.
 
-
-@cache
-def icub_left_hand() -> Hand:
-    """Return the left hand of the iCub: 20 joints coupled to 9 actuators, from its published joint table."""
-    bases = np.stack(
-        [
-            _frame(64.25, 26.22, -6.7, 5.0, 0.0, 4.1),
-            _frame(65.0, 9.77, -7.6),
-            _frame(64.13, -5.65, -7.0, -5.0, 0.0, -6.1),
-            _frame(62.11, -24.54, -6.0, -5.0, 0.0, -6.1),
-            _frame(39.0, 12.0, 2.5, 0.0, 4.76364, -29.04),
-        ]
-    )
-    bases[4, :, :3] = bases[4, :, :3] @ _frame(0.0, 0.0, 0.0, 90.0, 0.0, 90.0)[:, :3]
-    # The distal link is 21 mm from joint to skin: its axis ends one radius earlier, on the line to the tip (18, 5).
-    distal = (21.0 - 6.5) * np.array([18.0, 5.0]) / np.hypot(18.0, 5.0)
-    chains = 1e-3 * np.array(
-        [
-            [14.8, 1.75, 25.9, 22.0, *distal],
-            [15.3, 2.2, 25.8, 24.0, *distal],
-            [14.8, 1.75, 25.9, 22.0, *distal],
-            [14.8, -1.75, 21.9, 19.0, *distal],
-            [21.1, -4.9, 26.0, 22.0, *distal],
-        ]
-    )
-    lower, upper = np.zeros((5, 4)), np.full((5, 4), 90.0)
-    lower[:4, 0], upper[:4, 0], upper[4, 0] = -25.0, 25.0, 120.0
-    coupling = np.zeros((5, 4, 9))  # actuators: spread, thumb 3, index 2, middle 2, ring and little 1
-    coupling[[0, 2, 3], 0, 0] = 0.08, -0.05, -0.10
-    coupling[4, 0, 1] = coupling[4, 1, 2] = coupling[0, 1, 4] = coupling[1, 1, 6] = 1.0
-    for finger, actuator in ((4, 3), (0, 5), (1, 7)):
-        coupling[finger, 2, actuator], coupling[finger, 3, actuator] = 0.6, 0.4
-    coupling[2:4, 1:, 8] = 1.0, 0.9, 0.6
-    return Hand(
-        name="icub-left",
-        bases=bases,
-        chains=chains,
-        lower=np.radians(lower),
-        upper=np.radians(upper),
-        coupling=coupling,
-        radius=0.0065,
-        palm_center=1e-3 * np.array([29.0, 1.5, -7.0]),
-        palm_half_extents=1e-3 * np.array([40.0, 33.5, 15.0]),
-        palm_rounding=0.006,
-        grasp_center=1e-3 * np.array([60.0, 10.0, 25.0]),
-    )
-
-
-def hand_named(name: str) -> Hand:
-    """Return a shipped hand by name.
-
-    Raises
-    ------
-    InputError
-        If no hand of that name is shipped.
+    `near` and `far` (3,) are the ends of the link's axis, `offset` (3, 4) is rotation and origin of the next joint's
+    frame; all in the joint's moved frame.
     """
-    if name != "icub-left":
-        raise unknown_name("hand", name, ["icub-left"])
-    return icub_left_hand()
+    row = np.empty(_ROW)
+    row[0], row[1:4], row[4:7], row[7:] = float(slides), near, far, np.asarray(offset).ravel()
+    return row
 
 
 @njit(cache=True)
-def finger_joints(base, chain, q0, q1, q2, q3, ends):
-    """Write the link ends of one finger into ends (4, 2, 3): for each link the near and the far end of its axis.
+def finger_frames(base, chain, q, frames):
+    """Write the moved joint frames of one finger into frames (j, 3, 4).
 
-    base (3, 4) is the frame of the first joint, chain (6,) the lengths, q0 to q3 the joint angles.
+    base (3, 4) is the frame of the first joint, chain (j, 19) its joints and links, q (j,) the joint angles or shifts.
     """
-    c, s = np.cos(q0), np.sin(q0)
-    # After joint 1 and the twist: x is the finger's direction, y the side it bends to, z the bending axis.
-    for i in range(3):
-        x = base[i, 0] * c + base[i, 1] * s
-        side = -base[i, 0] * s + base[i, 1] * c
-        ends[0, 0, i] = base[i, 3]
-        ends[0, 1, i] = base[i, 3] + chain[0] * x - chain[1] * side
-        ends[1, 0, i] = ends[0, 1, i]
-        # bending plane spanned by x and y = base z
-        up = base[i, 2]
-        b1, b2, b3 = q1, q1 + q2, q1 + q2 + q3
-        ends[1, 1, i] = ends[1, 0, i] + chain[2] * (np.cos(b1) * x + np.sin(b1) * up)
-        ends[2, 0, i] = ends[1, 1, i]
-        ends[2, 1, i] = ends[2, 0, i] + chain[3] * (np.cos(b2) * x + np.sin(b2) * up)
-        ends[3, 0, i] = ends[2, 1, i]
-        cx, cy = np.cos(b3), np.sin(b3)
-        ends[3, 1, i] = ends[3, 0, i] + chain[4] * (cx * x + cy * up) + chain[5] * (-cy * x + cx * up)
+    for k in range(chain.shape[0]):
+        for i in range(3):
+            if k == 0:
+                for n in range(4):
+                    frames[0, i, n] = base[i, n]
+            else:
+                a, b, c = frames[k - 1, i, 0], frames[k - 1, i, 1], frames[k - 1, i, 2]
+                row = chain[k - 1]
+                for n in range(4):
+                    frames[k, i, n] = a * row[7 + n] + b * row[11 + n] + c * row[15 + n]
+                frames[k, i, 3] += frames[k - 1, i, 3]
+        if chain[k, 0] > 0.0:
+            for i in range(3):
+                frames[k, i, 3] += q[k] * frames[k, i, 2]
+        elif q[k] != 0.0:
+            cos, sin = np.cos(q[k]), np.sin(q[k])
+            for i in range(3):
+                x, y = frames[k, i, 0], frames[k, i, 1]
+                frames[k, i, 0] = cos * x + sin * y
+                frames[k, i, 1] = cos * y - sin * x
+
+
+@njit(cache=True)
+def axis_ends(frames, chain, ends):
+    """Write the ends of a finger's link axes into ends (j, 2, 3), from its frames (j, 3, 4)."""
+    for k in range(chain.shape[0]):
+        for i in range(3):
+            x, y, z, p = frames[k, i, 0], frames[k, i, 1], frames[k, i, 2], frames[k, i, 3]
+            ends[k, 0, i] = p + x * chain[k, 1] + y * chain[k, 2] + z * chain[k, 3]
+            ends[k, 1, i] = p + x * chain[k, 4] + y * chain[k, 5] + z * chain[k, 6]
+
+
+@njit(cache=True)
+def link_frames(bases, chains, angles):
+    """Return the moved frames of all joints (f j, 3, 4) at joint angles (f, j)."""
+    joints = chains.shape[1]
+    frames = np.empty((chains.shape[0] * joints, 3, 4))
+    for f in range(chains.shape[0]):
+        finger_frames(bases[f], chains[f], angles[f], frames[joints * f : joints * (f + 1)])
+    return frames
+
+
+@njit(cache=True)
+def link_ends(bases, chains, angles):
+    """Return the ends of all link axes (f j, 2, 3) at joint angles (f, j)."""
+    joints = chains.shape[1]
+    frames = np.empty((joints, 3, 4))
+    ends = np.empty((chains.shape[0] * joints, 2, 3))
+    for f in range(chains.shape[0]):
+        finger_frames(bases[f], chains[f], angles[f], frames)
+        axis_ends(frames, chains[f], ends[joints * f : joints * (f + 1)])
+    return ends

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.grasping.closing import link_ends
 from surehold.grasping.grasp import Grasp, Simulator
-from surehold.grasping.hand import PALM, Hand, link_name
+from surehold.grasping.hand import Hand, link_ends
 from surehold.grasping.poses import Pose
 
 __all__ = ["Scene", "SceneMesh", "grasp_scene"]
@@ -30,7 +29,7 @@ class Scene:
     """A grasp, or the open hand before it, as meshes and contacts in the world."""
 
     object: SceneMesh
-    hand: tuple[SceneMesh, ...]  #: the palm and 20 links
+    hand: tuple[SceneMesh, ...]  #: the palm's boxes and the links
     points: NDArray[np.float32] = field(repr=False)  #: (c, 3) contacts on the object [m]
     normals: NDArray[np.float32] = field(repr=False)  #: (c, 3) unit length, into the object
     weights: NDArray[np.float32] = field(repr=False)  #: (c,) in (0, 1]
@@ -68,12 +67,15 @@ def grasp_scene(simulator: Simulator, grasp: Grasp, opened: bool = False) -> Sce
 def hand_meshes(
     hand: Hand, pose: Pose, joints: NDArray[np.float64]
 ) -> list[tuple[str, NDArray[np.float64], NDArray[np.int32]]]:
-    """Return name, vertices (v, 3) and faces (f, 3) of the palm and of each link, in the frame `pose` leads to."""
+    """Return name, vertices (v, 3), faces (f, 3) of the palm's boxes and of each link, in the frame `pose` leads to."""
     ends = pose.apply(link_ends(hand.bases, hand.chains, np.ascontiguousarray(joints)))
-    palm, palm_faces = _rounded_box(hand.palm_half_extents, hand.palm_rounding)
-    bodies = [(link_name(PALM), pose.apply(palm + hand.palm_center), palm_faces)]
-    for body, (near, far) in enumerate(ends):
-        bodies.append((link_name(body), *_capsule(near, far, hand.radius)))
+    bodies = []
+    for placed, half, rounding in zip(hand.palm_poses, hand.palm_half_extents, hand.palm_roundings, strict=True):
+        vertices, faces = _rounded_box(half, float(rounding))
+        bodies.append(("palm", pose.apply(vertices @ placed[:, :3].T + placed[:, 3]), faces))
+    for name, (near, far), radius in zip(hand.link_names, ends, hand.radii.ravel(), strict=True):
+        if radius > 0.0:
+            bodies.append((name, *_capsule(near, far, float(radius))))
     return bodies
 
 

@@ -21,7 +21,7 @@ from surehold.grasping.grasp import THESIS, Simulator
 from surehold.grasping.grasp import Grasp as GraspOutcome
 from surehold.grasping.meshes import GraspObject, shipped_object
 from surehold.grasping.poses import Pose, default_pose, facet_axes
-from surehold.grasping.synergy import S1_RANGE, S1_USEFUL
+from surehold.grasping.synergy import preshape_of
 from surehold.optimization.box import Box
 from surehold.problems.grasp_defaults import GraspDefault, grasp_default
 from surehold.problems.problem import checked_points
@@ -129,9 +129,10 @@ class Grasp:
             raise unknown_name("preset", preset, ["thesis"])
         if preset:
             self._settings |= THESIS
-        self._s1_range = S1_RANGE if preset else S1_USEFUL
         self._simulator: Simulator | None = None
         self._simulator = self._build()
+        chosen = preshape_of(self._simulator.hand, self._simulator.preshape)
+        self._s1_range = chosen.s1_range if preset else chosen.s1_useful
         self.default: Final[GraspDefault] = grasp_default(self.simulator, facet)
         self._fixed: dict[str, float] = dict.fromkeys(VARIABLES, 0.0) | {"s1": self.default.s1} | dict(fixed or {})
         limits = self._limits(np.abs(axes.T) @ body.box_half_extents) | dict(bounds or {})

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from surehold.grasping.grasp import Simulator
 from surehold.grasping.meshes import OBJECTS
 from surehold.grasping.poses import MODES, Pose, default_pose, facet_axes
-from surehold.grasping.synergy import power_grasp
+from surehold.grasping.synergy import closing_motion, preshape_of
 
 __all__ = ["GraspDefault", "grasp_default", "search_default"]
 
@@ -29,7 +29,6 @@ class GraspDefault(NamedTuple):
 
 
 _FREE_SHARE: Final = (1.0 / 3.0, 2.0 / 3.0)  # of the coarse grid: 30 to 70 % of all poses, with a margin
-_POSTURES: Final = (-1.2, -0.95, -0.7, -0.45, -0.2, 0.1)
 
 #: (object, mode) -> standoff [mm], s1 [rad]; printed by this module
 _TABLE: Final[dict[tuple[str, str], tuple[float, float]]] = {
@@ -149,8 +148,8 @@ def search_default(simulator: Simulator, mode: str) -> GraspDefault:
         poses = [
             default_pose(simulator.hand, simulator.object, mode, standoff, (*offset, 0, 0, 0, 0)) for offset in offsets
         ]
-        for s1 in _POSTURES:
-            opened = power_grasp(simulator.hand, s1).joints(0.0)
+        for s1 in preshape_of(simulator.hand, simulator.preshape).s1_tries:
+            opened = closing_motion(simulator.hand, s1, simulator.preshape).joints(0.0)
             free = [pose for pose in poses if simulator.gaps(pose, opened).min() >= 0.0]
             share = len(free) / len(poses)
             outside = max(_FREE_SHARE[0] - share, share - _FREE_SHARE[1], 0.0)
