@@ -200,7 +200,7 @@ def test_the_port_and_the_token_are_checked(tmp_path):
             pass
 
 
-def test_schemathesis_finds_nothing(served):
+def test_schemathesis_finds_nothing(served, tmp_path):
     """Requests made up from the OpenAPI description, good and bad ones: no 5xx, no answer that it does not describe.
 
     Left out is the check that whatever fits the description is accepted: it cannot say that a value or `failed` must be
@@ -210,6 +210,6 @@ def test_schemathesis_finds_nothing(served):
     command = [sys.executable, "-m", "schemathesis.cli", "run", f"{address}/openapi.json", "--checks", "all"]
     command += ["--header", f"Authorization: Bearer {TOKEN}", "--max-examples", "4", "--seed", "1", "--no-color"]
     command += ["--exclude-checks", "positive_data_acceptance"]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=tmp_path)
     assert run.returncode == 0, run.stdout + run.stderr
     assert "Tested: 11" in run.stdout, run.stdout

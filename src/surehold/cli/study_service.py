@@ -2,6 +2,8 @@
 
 import signal
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -13,7 +15,7 @@ __all__ = ["commands"]
 
 def commands() -> list[tuple[str, Callable[..., Any]]]:
     """Return the commands by name."""
-    return [("work", work), ("serve", serve)]
+    return [("work", work), ("serve", serve), ("dashboard", dashboard), ("report", report)]
 
 
 def work(
@@ -80,3 +82,50 @@ def serve(
         if not token:
             typer.echo(f"Callers send the header: Authorization: Bearer {secret}")
         server.run(application)
+
+
+def dashboard(
+    name: Name,
+    port: Annotated[int, typer.Option(help="On the loopback interface; 0 takes a free one.", min=0, max=65535)] = 8080,
+    open_page: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
+    storage: Storage = "",
+) -> None:
+    """Show the study in optuna-dashboard, with the model and the recommendation."""
+    import webbrowser
+    from importlib.util import find_spec
+
+    from surehold.errors import InputError
+    from surehold.reports.interactive import interactive_plots
+    from surehold.reports.study_report import study_report
+    from surehold.studies.dashboard import Dashboard
+
+    if find_spec("optuna_dashboard") is None:
+        raise InputError("optuna-dashboard is not installed; install it with: pip install 'surehold[study]'.")
+    study = opened(name, storage)
+
+    def ready(address: str) -> None:
+        typer.echo(f"Study {name} at {address} ; Ctrl-C ends it.")
+        if open_page:
+            webbrowser.open(address)
+
+    with suppress(KeyboardInterrupt):
+        Dashboard(study, lambda study: interactive_plots(study_report(study))).serve("127.0.0.1", port, ready)
+
+
+def report(
+    name: Name,
+    out: Annotated[str, typer.Option(help="Folder; by default runs/NAME.", show_default=False)] = "",
+    open_page: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
+    storage: Storage = "",
+) -> None:
+    """Write the report of the study: a page that opens without network, figures, and data."""
+    import webbrowser
+
+    from surehold.reports.files import write_run
+    from surehold.reports.study_report import study_report
+
+    study = opened(name, storage)
+    page = write_run(study_report(study), out or Path("runs") / name)
+    typer.echo(f"Report: {page}")
+    if open_page:
+        webbrowser.open(page.resolve().as_uri())

@@ -54,6 +54,8 @@ def verdict(report: RunReport) -> Verdict:
             "narrow the search to where outcomes differ.",
             False,
         )
+    if highest.values.size == 0 and answer.values.size == 0 and answer.predicted_mean is not None:
+        return _of_the_model(report)
     if highest.values.size == 0 or answer.values.size == 0:
         if highest.n_failed:
             why = f"All {highest.n_failed} re-queries with perturbed inputs failed, so the point does not hold at all."
@@ -107,6 +109,25 @@ def verdict(report: RunReport) -> Verdict:
     )
     text += " More trials near both points would let the model see this."
     return Verdict(headline, text, False)
+
+
+def _of_the_model(report: RunReport) -> Verdict:
+    """Return the verdict where nothing was queried again: what the model expects."""
+    highest, answer, off = report.highest, report.recommended, report.disturbance
+    expected = number(answer.predicted_mean)
+    text = f"No re-queries with perturbed inputs were made: what happens when {off} is what the model expects."
+    if len(report.candidates) == 1:
+        headline = (
+            f"The highest trial is also the recommended one: {number(answer.quality)} when hit exactly; when {off}, "
+            f"the model expects {expected}."
+        )
+        return Verdict(headline, text, False)
+    headline = (
+        f"The highest peak ({number(highest.quality)}) is not recommended: when {off}, the model expects "
+        f"{number(highest.predicted_mean)} of it, and {expected} of the recommended point."
+    )
+    where = f"Recommended is {coordinates(report, answer.x)} ({_trial(answer)} of {report.y.size}). {text}"
+    return Verdict(headline, where, True)
 
 
 def _sentence(candidate: Candidate, subject: str, name: str) -> str:

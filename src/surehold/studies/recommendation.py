@@ -3,6 +3,7 @@
 Written as the study's attribute `surehold:recommendation` and as its note, which optuna-dashboard shows.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
@@ -69,8 +70,9 @@ def recommend(study: Study, sampler: Sampler | None = None) -> StudyRecommendati
     if study.user_attrs.get(RECOMMENDATION) != found.as_dict():
         study.set_user_attr(RECOMMENDATION, found.as_dict())
     backend, study_id = study._storage, study._study_id
+    units = study.user_attrs.get("surehold:settings", {}).get("units", {})
     before = read_note(backend, study_id)
-    note = note_of(found, study.study_name) + before.partition(_END)[2]
+    note = note_of(found, study.study_name, units) + before.partition(_END)[2]
     if note != before:
         write_note(backend, study_id, note)
     return found
@@ -111,14 +113,14 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     )
 
 
-def note_of(found: StudyRecommendation, name: str) -> str:
-    """Return the recommendation as text in Markdown."""
+def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> str:
+    """Return the recommendation as text in Markdown; units by parameter."""
     lines = [
         f"**Recommended for {name}: trial {found.trial}**",
         "",
         "| parameter | value |",
         "| --- | --- |",
-        *(f"| {key} | {_shown(value)} |" for key, value in found.parameters.items()),
+        *(f"| {key} | {_shown(value)} {units.get(key, '')} |" for key, value in found.parameters.items()),
         "",
         f"Expect {found.mean:.4g} ± {found.std:.2g} when the input is off; 95 % of executions are better than "
         f"{found.quantile:.4g}. It gave {found.observed:.4g} when it was tried. {found.n} trials with a value.",

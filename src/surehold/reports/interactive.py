@@ -1,0 +1,128 @@
+"""Plots of one run as plotly.js draws them: plain data, made from the run's report."""
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.reports.run_report import RunReport, Surface, Variable
+
+__all__ = ["interactive_plots"]
+
+_HIGHEST, _ANSWER, _TRIAL = "#d1495b", "#2a7f62", "#5b6573"
+
+
+def interactive_plots(report: RunReport) -> dict[str, str]:
+    """Return plots by name as JSON {data, layout}: progress, the model, and its average over the input noise."""
+    plots = {"surehold-1-progress": _progress(report)}
+    for i, surface in enumerate(report.surfaces):
+        end = f"-{i + 1}" if len(report.surfaces) > 1 else ""
+        if len(surface.variables) == 1:
+            plots[f"surehold-2-model{end}"] = _line(report, surface)
+            continue
+        plots[f"surehold-2-model{end}"] = _map(
+            report, surface, surface.mean, "Model: expected value where the input is exact"
+        )
+        if surface.robust_mean is not None:
+            title = "Model under the input noise (unscented mean)"
+            plots[f"surehold-3-under-noise{end}"] = _map(report, surface, surface.robust_mean, title)
+    return {name: json.dumps(plot, allow_nan=False) for name, plot in plots.items()}
+
+
+def _progress(report: RunReport) -> dict[str, Any]:
+    number = np.arange(1, report.y.size + 1)
+    data = [
+        _points(number, report.y, "trial", {"color": _TRIAL, "size": 6}),
+        _curve(number, report.best_trace, "highest observed", _HIGHEST, shape="hv"),
+    ]
+    if report.robust_trace is not None:
+        known = np.isfinite(report.robust_trace)
+        data.append(
+            _curve(
+                number[known], report.robust_trace[known], "recommended, expected under the noise", _ANSWER, shape="hv"
+            )
+        )
+    return _plot("Highest observed and robust value", data, "trial", report.quality_name)
+
+
+def _line(report: RunReport, surface: Surface) -> dict[str, Any]:
+    variable = report.variables[surface.variables[0]]
+    grid = surface.axes[0] * variable.factor
+    data = [_curve(grid, surface.mean, "model", _TRIAL)]
+    if surface.std is not None:
+        band = np.concatenate([surface.mean + 2.0 * surface.std, (surface.mean - 2.0 * surface.std)[::-1]])
+        shade = {"fill": "toself", "line": {"width": 0}, "fillcolor": "rgba(91,101,115,0.18)", "hoverinfo": "skip"}
+        around = np.concatenate([grid, grid[::-1]])
+        data.insert(0, _curve(around, band, "± 2 standard deviations", _TRIAL) | shade)
+    if surface.robust_mean is not None:
+        data.append(_curve(grid, surface.robust_mean, "under the input noise (unscented mean)", _ANSWER))
+    column = report.X[:, surface.variables[0]] * variable.factor
+    data.append(_points(column, report.y, "trials", {"color": _TRIAL, "size": 6}))
+    for x, y, name, color in _candidates(report):
+        data.append(
+            _points(x[surface.variables[0] : surface.variables[0] + 1] * variable.factor, y, name, _mark(color))
+        )
+    return _plot("Model", data, variable.label, report.quality_name)
+
+
+def _map(report: RunReport, surface: Surface, values: NDArray[np.floating], title: str) -> dict[str, Any]:
+    first, second = (report.variables[k] for k in surface.variables)
+    across, up = (_scaled(axis, v) for axis, v in zip(surface.axes, (first, second), strict=True))
+    data: list[dict[str, Any]] = [
+        {
+            "type": "heatmap",
+            "x": _numbers(across),
+            "y": _numbers(up),
+            "z": [_numbers(row) for row in values.T],
+            "colorscale": "Viridis",
+            "colorbar": {"title": {"text": report.quality_name}},
+        }
+    ]
+    a, b = surface.variables
+    marker = {"color": "white", "size": 5, "line": {"color": "black", "width": 1}}
+    data.append(_points(_scaled(report.X[:, a], first), _scaled(report.X[:, b], second), "trials", marker))
+    for x, _, name, color in _candidates(report):
+        spot = _scaled(x[a : a + 1], first), _scaled(x[b : b + 1], second)
+        data.append(_points(*spot, name, _mark(color)))
+    note = f" ({surface.note})" if surface.note else ""
+    return _plot(title + note, data, first.label, second.label)
+
+
+def _candidates(report: RunReport) -> list[tuple[NDArray[np.floating], NDArray[np.floating], str, str]]:
+    found = [(report.recommended, "recommended", _ANSWER)]
+    if report.highest is not report.recommended:
+        found.insert(0, (report.highest, "highest observed", _HIGHEST))
+    return [(c.x, np.array([c.quality]), name, color) for c, name, color in found]
+
+
+def _scaled(values: NDArray[np.floating], variable: Variable) -> NDArray[np.floating]:
+    return values * variable.factor
+
+
+def _mark(color: str) -> dict[str, Any]:
+    return {"color": color, "size": 14, "symbol": "star", "line": {"color": "white", "width": 1}}
+
+
+def _points(x: NDArray[Any], y: NDArray[Any], name: str, marker: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "scatter", "mode": "markers", "x": _numbers(x), "y": _numbers(y), "name": name, "marker": marker}
+
+
+def _curve(x: NDArray[Any], y: NDArray[Any], name: str, color: str, shape: str = "linear") -> dict[str, Any]:
+    line = {"color": color, "shape": shape}
+    return {"type": "scatter", "mode": "lines", "x": _numbers(x), "y": _numbers(y), "name": name, "line": line}
+
+
+def _plot(title: str, data: list[dict[str, Any]], across: str, up: str) -> dict[str, Any]:
+    layout = {
+        "title": {"text": title},
+        "xaxis": {"title": {"text": across}},
+        "yaxis": {"title": {"text": up}},
+        "legend": {"orientation": "h", "y": -0.25},
+    }
+    return {"data": data, "layout": layout}
+
+
+def _numbers(values: NDArray[Any]) -> list[float | None]:
+    """Return five significant digits of each: what a screen can show."""
+    return [float(f"{value:.5g}") if np.isfinite(value) else None for value in np.asarray(values, dtype=np.float64)]

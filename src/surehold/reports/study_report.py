@@ -1,0 +1,51 @@
+"""The report of a stored study: what it holds now, whoever made its trials."""
+
+from dataclasses import replace
+from typing import Any
+
+from surehold.optimization.maximization import Result
+from surehold.reports import gather
+from surehold.reports.run_report import Candidate, RunReport
+from surehold.studies.replay import result_of
+from surehold.studies.robot import RobotStudy
+
+__all__ = ["study_report"]
+
+
+def study_report(study: RobotStudy) -> RunReport:
+    """Return the report of a study; raises InputError if no trial has given a value yet."""
+    result = result_of(study)
+    space, settings = study.settings.space, study.settings
+    box = result.optimizer.box
+    units = {
+        name: f"{'log ' * bool(getattr(distribution, 'log', False))}{settings.units.get(name, '')}".strip()
+        for name, distribution in space.distributions.items()
+        if name in box.names
+    }
+    shown: dict[str, Any] = {"study": study.name, "storage": study.storage.shown, **settings.optimizer}
+    pending = sum(not trial.state.is_finished() for trial in study.trials())
+    notes = [f"{pending} trial{'s are' if pending > 1 else ' is'} still under way."] if pending else []
+    reason = study.paused or study.stopped()
+    if reason:
+        notes.append(f"The study is {'paused' if study.paused else 'stopped'}: {reason}.")
+    notes.append("Trials are counted from 1 here, in the order of their ids, which begin at 0.")
+    rule = study.stop_rule
+    return gather.report_of(
+        result,
+        [_candidate(result, label, index) for label, index in gather.answers(result).items()],
+        title=f"Study {study.name}",
+        settings=shown,
+        noise=result.optimizer.input_noise,
+        units=units,
+        planned_trials=rule.trials,
+        notes=notes,
+    )
+
+
+def _candidate(result: Result, label: str, index: int) -> Candidate:
+    """Return a trial with what the model expects of it; the robot is not asked to make it again."""
+    found = gather.candidate(result, label, index, None)
+    if label == "recommended":
+        return replace(found, predicted_mean=result.recommendation.mean, predicted_std=result.recommendation.std)
+    mean, _ = result.optimizer.predict(found.x[None, :], under_noise=True)
+    return replace(found, predicted_mean=float(mean[0]))
