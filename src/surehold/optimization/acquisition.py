@@ -28,7 +28,13 @@ from surehold.optimization.surrogate import Moments, Posterior
 __all__ = ["CRITERIA", "Acquisition", "CriterionName", "criterion_name", "where_to_look"]
 
 _BASES: Final = ("ei", "log_ei", "pi", "ucb")
-CRITERIA: Final = (*_BASES, *(f"u{base}" for base in _BASES), *(f"robust_{base}" for base in _BASES))
+CRITERIA: Final = (
+    *_BASES,
+    *(f"u{base}" for base in _BASES),
+    *(f"robust_{base}" for base in _BASES),
+    "thompson",
+    "robust_thompson",
+)
 
 Scale = Literal["exact", "unscented", "robust"]
 
@@ -38,7 +44,7 @@ class CriterionName:
     """A criterion's public name, taken apart."""
 
     base: str
-    """"ei", "log_ei", "pi" or "ucb" """
+    """"ei", "log_ei", "pi", "ucb" or "thompson" """
     scale: Scale
 
 
@@ -48,7 +54,7 @@ def criterion_name(name: str) -> CriterionName:
         raise unknown_name("criterion", name, CRITERIA)
     if name.startswith("robust_"):
         return CriterionName(name.removeprefix("robust_"), "robust")
-    if name in _BASES:
+    if name in _BASES or name == "thompson":
         return CriterionName(name, "exact")
     return CriterionName(name[1:], "unscented")
 

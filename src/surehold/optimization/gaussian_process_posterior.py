@@ -161,9 +161,10 @@ class GaussianProcessPosterior:
         )
         return self.outputs.shift + self.outputs.scale * draws
 
-    def thinned(self, count: int) -> "GaussianProcessPosterior":
-        """Return the posterior of about `count` of the particles: a cheaper approximation."""
-        every = slice(0, None, max(1, len(self._Y) // count))
+    def thinned(self, count: int, first: int = 0) -> "GaussianProcessPosterior":
+        """Return the posterior of about `count` of the particles, from number `first` on: a cheaper approximation."""
+        step = max(1, len(self._Y) // count)
+        every = slice(first % step, None, step)
         return GaussianProcessPosterior(
             self.evidence,
             self.hyperparameters.theta[every],

@@ -26,6 +26,8 @@ __all__ = ["Goal"]
 _ANCHORS: Final = 3
 _SHORTLIST: Final = 16
 _SCREENED: Final = 3  # particles, of all, that choose where to look closer
+_PLAUSIBLE: Final = 3.0  # standard deviations within which a function is drawn
+_JOINT: Final = 512  # points at which it is drawn: the cost grows with the cube
 _PATIENCE: Final = 3
 # Improvement that is worth a trial where observations are exact, in mean absolute deviations of the outputs. Without it
 # what is left of the model's variance beside the incumbent, the nugget's, draws trial after trial to the same hill.
@@ -120,6 +122,8 @@ class Goal:
         ):
             return maximizer.largest_holes(np.concatenate([tried, failed, pending]), rng)
         best, anchors = self._incumbent(posterior, tried, observed)
+        if self.criterion.base == "thompson" and self.risk.name == "mean":
+            return self._drawn(posterior, anchors, rng)
         if len(pending):
             posterior = posterior.with_pending(pending)
             best = np.maximum(best, self._believed(posterior, pending))
@@ -211,6 +215,27 @@ class Goal:
             return float(self._risk(posterior, 0.0).expectation(anchors[:1])[0]), anchors
         best = self.accurate.outcome(posterior, anchors[:1]).mean  # (m, 1)
         return best if self.criterion.scale == "robust" else float(best.mean()), anchors
+
+    def _drawn(
+        self, posterior: Posterior, anchors: NDArray[np.float64], rng: np.random.Generator
+    ) -> NDArray[np.float64]:
+        """Return candidates (c, d), the maximum of a function drawn from the posterior first (Thompson sampling).
+
+        One particle is drawn, then its function (of the outcome under the input noise where the scale is robust) at
+        the candidates with the highest upper confidence bounds, jointly. Trials under way need no care: every draw
+        is another function.
+        """
+        d = anchors.shape[1]
+        one = posterior.thinned(1, int(rng.integers(2**31)))
+        perturbations = self.coarse if self.criterion.scale == "robust" else Perturbations(exact(d))
+        points = maximizer.promising(d, anchors, rng, posterior.regions)
+        bound = CriterionName("ucb", "robust")
+        upper = Acquisition(one, bound, perturbations, 0.0, kappa=_PLAUSIBLE)(points)
+        weights = perturbations.quadrature.weights
+        points = points[np.argsort(-upper, kind="stable")[: _JOINT // len(weights)]]
+        around = perturbations.around(points).reshape(1, -1, d)
+        draw = one.sample(around, rng.standard_normal((1, around.shape[1])))[0, 0, 0]
+        return points[np.argsort(-(draw.reshape(len(points), -1) @ weights), kind="stable")]
 
     def _believed(self, posterior: Posterior, pending: NDArray[np.float64]) -> Any:
         """Return the best value that trials under way (p, d) are believed to give, on the criterion's scale.

@@ -63,9 +63,9 @@ class LatticePosterior:
         """Return joint draws (m, q, b, s) of f at the snapped points (q, s, d)."""
         return self._posterior.sample(self._lattice.snap(points), normals)
 
-    def thinned(self, count: int) -> "LatticePosterior":
-        """Return the posterior of about `count` of the particles: a cheaper approximation."""
-        return LatticePosterior(self._posterior.thinned(count), self._lattice)
+    def thinned(self, count: int, first: int = 0) -> "LatticePosterior":
+        """Return the posterior of about `count` of the particles, from number `first` on: a cheaper approximation."""
+        return LatticePosterior(self._posterior.thinned(count, first), self._lattice)
 
     def with_pending(self, X: NDArray[np.float64]) -> "LatticePosterior":
         """Return the posterior as if each particle's own mean had been observed at X (k, d)."""

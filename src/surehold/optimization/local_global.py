@@ -210,9 +210,10 @@ class LocalGlobalPosterior:
                 draws[j, i] = K @ particle.alpha + normals @ root.T
         return self._outputs.shift + self._outputs.scale * draws
 
-    def thinned(self, count: int) -> "LocalGlobalPosterior":
-        """Return the posterior of about `count` of the particles: a cheaper approximation."""
-        every = self._particles[:: max(1, len(self._particles) // count)]
+    def thinned(self, count: int, first: int = 0) -> "LocalGlobalPosterior":
+        """Return the posterior of about `count` of the particles, from number `first` on: a cheaper approximation."""
+        step = max(1, len(self._particles) // count)
+        every = self._particles[first % step :: step]
         return LocalGlobalPosterior(self._X, every, self._outputs, self.diagnostics.evaluations)
 
     def surprise(self, k: int) -> float:

@@ -7,7 +7,7 @@ from surehold.optimization.ascent import Objective, climb
 from surehold.optimization.dividing_rectangles import divide_rectangles
 from surehold.optimization.surrogate import Regions
 
-__all__ = ["direct", "largest_holes", "multistart"]
+__all__ = ["direct", "largest_holes", "multistart", "promising"]
 
 _CANDIDATES = 256
 _HOLES = 1024
@@ -40,9 +40,24 @@ def multistart(
         Boxes in each of which candidates are laid, and which no ascent leaves; together they are a box, too. None is
         the cube.
     """
+    regions = regions or Regions.whole(dimension)
+    points = promising(dimension, anchors, rng, regions)
+    points = points[np.argsort(-screen(points), kind="stable")]
+    home = _regions_of(points, regions)
+    starts = _spread(points, _STARTS)
+    if len(regions.lower) > 1:  # the best candidate of each of the best regions, then the best ones wherever they are
+        leaders = np.sort(np.unique(home, return_index=True)[1])[:_STARTS_IN_REGIONS]
+        starts = sorted({*leaders.tolist(), *starts})
+    tops, values = climb(objective, points[starts], regions.lower[home[starts]], regions.upper[home[starts]])
+    return np.concatenate([tops[np.argsort(-values, kind="stable")], points])
+
+
+def promising(
+    dimension: int, anchors: NDArray[np.float64], rng: np.random.Generator, regions: Regions
+) -> NDArray[np.float64]:
+    """Return points (c, d) where a maximum may be: a Sobol sequence, another in every region, copies of the anchors."""
     from scipy.stats import qmc
 
-    regions = regions or Regions.whole(dimension)
     lower, upper = regions.lower.min(axis=0), regions.upper.max(axis=0)
     candidates = [lower + (upper - lower) * qmc.Sobol(dimension, rng=rng).random(_CANDIDATES)]
     for scale in _SCALES:
@@ -52,15 +67,7 @@ def multistart(
         inside = qmc.Sobol(dimension, rng=rng).random(_IN_REGIONS)[: max(1, _IN_REGIONS // len(regions.lower))]
         width = regions.upper - regions.lower
         candidates.append((regions.lower[:, None] + inside * width[:, None]).reshape(-1, dimension))
-    points = np.concatenate(candidates)
-    points = points[np.argsort(-screen(points), kind="stable")]
-    home = _regions_of(points, regions)
-    starts = _spread(points, _STARTS)
-    if len(regions.lower) > 1:  # the best candidate of each of the best regions, then the best ones wherever they are
-        leaders = np.sort(np.unique(home, return_index=True)[1])[:_STARTS_IN_REGIONS]
-        starts = sorted({*leaders.tolist(), *starts})
-    tops, values = climb(objective, points[starts], regions.lower[home[starts]], regions.upper[home[starts]])
-    return np.concatenate([tops[np.argsort(-values, kind="stable")], points])
+    return np.concatenate(candidates)
 
 
 def direct(

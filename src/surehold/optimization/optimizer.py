@@ -52,7 +52,8 @@ class Optimizer:
         with the method `condition` (see `surrogate.Surrogate`).
     criterion
         "ei", "log_ei", "pi", "ucb"; with input noise also "uei", "ulog_ei", "upi", "uucb" (the criterion averaged over
-        sigma points) and "robust_ei", ... (the criterion of the averaged outcome). By default "log_ei" without and
+        sigma points) and "robust_ei", ... (the criterion of the averaged outcome); "thompson" and "robust_thompson"
+        (the maximum of a function, or of its outcome, drawn from the posterior). By default "log_ei" without and
         "robust_log_ei" with input noise; in the thesis presets "ei" and "uei".
     n_initial
         Trials of the initial design; by default 5 a variable, at least 6.

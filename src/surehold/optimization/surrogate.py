@@ -104,8 +104,8 @@ class Posterior(Protocol):
         """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
         ...
 
-    def thinned(self, count: int) -> "Posterior":
-        """Return the posterior of about `count` of the particles, evenly taken: a cheaper approximation."""
+    def thinned(self, count: int, first: int = 0) -> "Posterior":
+        """Return the posterior of about `count` of the particles, evenly taken from number `first` on."""
         ...
 
     def with_pending(self, X: NDArray[np.float64]) -> "Posterior":

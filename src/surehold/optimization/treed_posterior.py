@@ -85,10 +85,10 @@ class TreedPosterior:
             draws[np.ix_(np.arange(m), rows, np.arange(len(normals)), columns)] = part
         return draws
 
-    def thinned(self, count: int) -> "TreedPosterior":
-        """Return the posterior of about `count` of the particles: a cheaper approximation."""
+    def thinned(self, count: int, first: int = 0) -> "TreedPosterior":
+        """Return the posterior of about `count` of the particles, from number `first` on: a cheaper approximation."""
         return TreedPosterior(
-            self.partition, tuple(leaf.thinned(count) for leaf in self.leaves), self.diagnostics.observations
+            self.partition, tuple(leaf.thinned(count, first) for leaf in self.leaves), self.diagnostics.observations
         )
 
     def with_pending(self, X: NDArray[np.float64]) -> "TreedPosterior":
@@ -168,9 +168,9 @@ class AveragedTrees:
         """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
         return np.concatenate([tree.sample(points, normals) for tree in self.trees])
 
-    def thinned(self, count: int) -> "AveragedTrees":
-        """Return the posterior of about `count` of the particles of every tree: a cheaper approximation."""
-        return AveragedTrees(tuple(tree.thinned(count) for tree in self.trees))
+    def thinned(self, count: int, first: int = 0) -> "AveragedTrees":
+        """Return the posterior of about `count` of the particles of every tree, from number `first` on."""
+        return AveragedTrees(tuple(tree.thinned(count, first) for tree in self.trees))
 
     def with_pending(self, X: NDArray[np.float64]) -> "AveragedTrees":
         """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
