@@ -6,7 +6,7 @@ from optuna.testing.pytest_samplers import BasicSamplerTestCase, RelativeSampler
 
 import surehold as sh
 
-pytestmark = pytest.mark.filterwarnings("default")
+pytestmark = pytest.mark.filterwarnings("ignore")
 
 SETTINGS = {
     "default": lambda: sh.Sampler(seed=0),

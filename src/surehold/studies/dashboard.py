@@ -44,6 +44,7 @@ class Dashboard:
         self._seen = -1
         self._attributes: dict[str, Any] = {}
         self._over = threading.Event()
+        self._server: WSGIServer | None = None
 
     def application(self) -> Any:
         """Return the WSGI application."""
@@ -74,6 +75,7 @@ class Dashboard:
             server = make_server(host, port, self.application(), _Server, _Quiet)
         except (OSError, OverflowError) as error:
             raise InputError(f"port {port} cannot be used: {getattr(error, 'strerror', None) or error}.") from None
+        self._server = server
         with server:
             thread = threading.Thread(target=self._keep_updating, daemon=True)
             thread.start()
@@ -83,6 +85,11 @@ class Dashboard:
             finally:
                 self._over.set()
                 thread.join()
+
+    def close(self) -> None:
+        """End `serve`, from another thread."""
+        if self._server is not None:
+            self._server.shutdown()
 
     def _keep_updating(self) -> None:
         while True:

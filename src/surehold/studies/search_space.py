@@ -98,7 +98,10 @@ class SearchSpace:
                 self._fixed[name] = _only_value(distribution)
             elif isinstance(distribution, CategoricalDistribution):
                 self._choices.append((len(bounds), name, distribution))
-                bounds |= {f"{name}={choice}#{i}": (0.0, 1.0) for i, choice in enumerate(distribution.choices)}
+                texts = [str(choice) for choice in distribution.choices]
+                if len(set(texts)) < len(texts):  # such as 1 and "1"
+                    texts = [f"{choice!r} ({i})" for i, choice in enumerate(distribution.choices)]
+                bounds |= {f"{name}={text}": (0.0, 1.0) for text in texts}
             else:
                 numeric = _numeric(name, distribution)
                 self._numeric.append((len(bounds), numeric))
