@@ -32,8 +32,13 @@ def folders(tmp_path_factory, cheap):
     return sorted(path for path in root.iterdir())
 
 
-def test_the_whole_report(tmp_path, folders):
-    page = write_report(folders, tmp_path)
+@pytest.fixture(scope="module")
+def page(tmp_path_factory, folders):
+    return write_report(folders, tmp_path_factory.mktemp("report"))
+
+
+def test_the_whole_report(page):
+    folder = page.parent
     text = page.read_text(encoding="utf-8")
     assert not re.search(r'(?:src|href)="https?:', text), "the page loads something from the network"
     for word in ("5.3279 ± 0.0642", "no runs", "unfinished", "1.66 standard errors", "A cheap plan"):
@@ -41,20 +46,19 @@ def test_the_whole_report(tmp_path, folders):
     for number in ("3.1", "3.3", "3.4", "4.1", "4.4", "4.5", "4.7", "4.9", "4.10", "4.12"):
         assert f"Figure {number}" in text, number
     assert text.count("Figure 4.16: ") >= 4  # safe and unsafe answers, each with its worst re-query
-    with open(tmp_path / "tables" / "table-4.1-defaults.csv", encoding="utf-8") as file:
+    with open(folder / "tables" / "table-4.1-defaults.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 15
     assert rows[0]["published"] == "5.3279 ± 0.0642"
     assert rows[0]["runs"] == "3 of 100"
-    assert (tmp_path / "figures" / "table-4.1-defaults-figure-4.5.svg").stat().st_size > 5000
-    assert (tmp_path / "figures" / "figure-4.4.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / "figures" / "table-4.1-defaults-figure-4.5.svg").stat().st_size > 5000
+    assert (folder / "figures" / "figure-4.4.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_page_opens_in_a_browser(tmp_path, folders):
+def test_the_page_opens_in_a_browser(page):
     browser = shutil.which("chromium") or shutil.which("chromium-browser")
     if browser is None:
         pytest.skip("no chromium here")
-    page = write_report(folders, tmp_path)
     command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", "--virtual-time-budget=8000"]
     told = subprocess.run([*command, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
     assert 'data-view="0"' in told.stdout
@@ -73,8 +77,12 @@ def test_the_same_plan_twice_is_refused(folders):
         read_campaigns([folders[0], folders[0]])
 
 
-def test_illustrations_show_what_they_say():
-    pictures = {picture.name: picture for picture in illustrations()}
+@pytest.fixture(scope="module")
+def pictures():
+    return {picture.name: picture for picture in illustrations()}
+
+
+def test_illustrations_show_what_they_say(pictures):
     assert list(pictures) == [f"figure-{n}" for n in ("3.1", "3.3", "3.4", "4.1", "4.4", "4.7", "4.9")]
     kernel = pictures["figure-3.1"].panels[0].lines[1]
     r = np.sqrt(5.0) * kernel.x
@@ -86,9 +94,9 @@ def test_illustrations_show_what_they_say():
     assert gf[34, 25] == pytest.approx(GF()([0.34, 0.25]))
 
 
-def test_the_unscented_example_is_the_lognormal():
+def test_the_unscented_example_is_the_lognormal(pictures):
     """Figure 3.3 sends N(0.35, 0.2^2) through exp(3 x), whose mean and deviation are known."""
-    caption = next(p.caption for p in illustrations() if p.name == "figure-3.3")
+    caption = pictures["figure-3.3"].caption
     mean = np.exp(3.0 * 0.35 + 0.5 * 0.6**2)
     std = mean * np.sqrt(np.exp(0.6**2) - 1.0)
     numbers = [float(n) for n in re.findall(r"\d+\.\d+", caption)]
@@ -97,9 +105,9 @@ def test_the_unscented_example_is_the_lognormal():
     assert abs(numbers[2] - mean) < 0.2 * abs(numbers[4] - mean), "the unscented mean is no better than the linear one"
 
 
-def test_the_tree_sees_what_the_process_does_not():
+def test_the_tree_sees_what_the_process_does_not(pictures):
     """Figure 4.4: between samples of the smooth half the treed process is much surer than the plain one."""
-    plain, treed = next(p for p in illustrations() if p.name == "figure-4.4").panels
+    plain, treed = pictures["figure-4.4"].panels
 
     def width(panel):
         smooth = panel.bands[0].x < 0.6

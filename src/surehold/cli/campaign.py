@@ -208,7 +208,7 @@ def duration(seconds: float | None) -> str:
     Examples
     --------
     >>> duration(4000.0), duration(75.0), duration(None)
-    ('1 h 07 min', '1 min 15 s', '?')
+    ('1 h 06 min', '1 min 15 s', '?')
     """
     if seconds is None:
         return "?"
