@@ -33,7 +33,7 @@ def grasp(
     ] = "right-front",
     variables: Annotated[str, typer.Option(help="Free variables, of dx,dy,dz,rx,ry,rz,s1.")] = "dx,dy",
     contact: Annotated[str, typer.Option(help="single, patch or graded (soft touch).")] = "graded",
-    quality: Annotated[str, typer.Option(help="epsilon or volume.")] = "epsilon",
+    quality: Annotated[str, typer.Option(help="epsilon, signed_epsilon, volume, simox, task or closure.")] = "epsilon",
     method: Method = "ubo",
     trials: Trials = 100,
     initial: Initial = 40,
@@ -43,6 +43,7 @@ def grasp(
     out: Out = "",
     study: Study = "",
     storage: StudyStorage = "",
+    check: Annotated[bool, typer.Option("--check", help="Shake the grasps found, by physics (MuJoCo).")] = False,
     open_report: Open = False,
 ) -> None:
     """Find a grasp that still holds when the hand is off."""
@@ -68,17 +69,24 @@ def grasp(
     console = terminal()
     with announced(console):
         problem = Grasp(obj, facet, names, contact=contact, quality=quality)
+    checker = None
+    if check:
+        from surehold.grasping.dynamics import GraspChecker
+
+        checker = GraspChecker(problem.simulator)  # before the run: without MuJoCo it says so at once
     folder = folder_for(f"{problem.object.name} {facet}", method, seed, out, study)
 
     def describe(candidate: Candidate) -> Candidate:
         outcome = problem.grasp(candidate.x)
         position = ", ".join(f"{1000 * p:.1f}" for p in outcome.pose.position)
         turn = ", ".join(f"{q:.3f}" for q in outcome.pose.quaternion)
+        physics = {} if checker is None else {"physics": checked(checker.check(outcome), console)}
         return replace(
             candidate,
             status=outcome.status,
             pose=f"palm at ({position}) mm, quaternion ({turn}), s1 = {outcome.s1:.2f} rad",
-            details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)},
+            details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
+            | physics,
             scene=gather.grasp_scene(problem.simulator.scene(outcome)),
         )
 
@@ -120,6 +128,15 @@ def touching_links(names: Sequence[str]) -> str:
     """Return how many links of each finger touch, from names such as "index distal" and "palm"."""
     counts = Counter(name.partition(" ")[0] for name in names)
     return ", ".join(f"{finger} {n}" if finger != "palm" else finger for finger, n in counts.items()) or "none"
+
+
+def checked(outcome: Any, console: Any) -> str:
+    """Return what physics says of a grasp, and print it."""
+    worst = max(outcome.loads, key=lambda load: load.moved)
+    moved = f"moves {1000 * worst.moved:.1f} mm under {worst.load}" if worst.moved < 1.0 else f"lost under {worst.load}"
+    text = f"{outcome.verdict}, {moved}"
+    console.print(f"physics: {text}")
+    return text
 
 
 def write_grasps(problem: Any, report: Any, path: Path) -> None:
