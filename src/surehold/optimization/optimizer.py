@@ -6,7 +6,7 @@ Legend
 """
 
 import warnings
-from typing import Final, Literal
+from typing import Final, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,12 @@ from surehold.optimization.goal import Goal
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.lattice import Lattice, LatticePosterior
 from surehold.optimization.local_global import LocalGlobalProcess
+from surehold.optimization.noisy_inputs import (
+    NoisySurrogate,
+    condition_on_noisy_inputs,
+    noise_from_reached,
+    noise_from_repeats,
+)
 from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
 from surehold.optimization.quadratures import exact
 from surehold.optimization.recommendation import Recommendation, recommendation
@@ -80,6 +86,11 @@ class Optimizer:
         What is asked of the outcome under input noise: "mean" (default), "mean-std", "var", "cvar" or "worst", or a
         `Risk` with parameters of its own. Any but the mean replaces the criterion by the expected improvement of that
         measure, or, for "worst", by its upper confidence bound.
+    noise_while_exploring
+        Where the input noise acts. False (default): only when the answer is used; trials reach what is commanded, as in
+        a simulator. True: trials stray, too. Those whose reached input is told (`tell(x, y, reached=...)`) are learnt
+        from where they were; the others count as less precise where the function is steep (McHutchon and Rasmussen
+        2011; left out where observation noise is inferred, which contains it).
     trust_region
         Whether the next trial is sought in a box around the best one that grows with success and shrinks without
         (after TuRBO): an option for six variables and more; off by default.
@@ -112,6 +123,7 @@ class Optimizer:
         border: str = "extend",
         kappa: float = 2.0,
         risk: str | Risk = "mean",
+        noise_while_exploring: bool = False,
         trust_region: bool = False,
         preset: str | None = None,
         lattice: Lattice | None = None,
@@ -161,11 +173,17 @@ class Optimizer:
             risk=risk,
             margin=0.0 if thesis is None else thesis.margin,
             kappa=float(kappa),
-            noisy=noise != "none" and noise != 0.0,
+            noisy=(noise != "none" and noise != 0.0) or noise_while_exploring,
             trust_region=trust_region,
             n_initial=self.n_initial,
             thesis=thesis is not None,
         )
+        if noise_while_exploring and (input_noise is None or thesis is not None or surrogate not in ("gp", "tgp")):
+            raise InputError(
+                "noise_while_exploring needs input_noise= and the surrogate 'gp' or 'tgp', without a thesis preset."
+            )
+        self._straying = noise_while_exploring and not (isinstance(noise, str) and noise != "none")
+        self._known_noise = 0.0 if isinstance(noise, str) else float(noise)
         self._lattice = lattice
         rng = np.random.default_rng([self.seed, 0])
         self._design = initial_design(design, self.n_initial, box.dimension, rng)
@@ -344,6 +362,23 @@ class Optimizer:
                 posterior, self._trials.reached[told], self._trials.values[told], self._rng(4, len(self._trials))
             )
 
+    def estimate_input_noise(self) -> InputNoise:
+        """Return the input noise that the trials told so far show.
+
+        From the reached inputs if enough trials told them; else from values that differ between trials of one commanded
+        input, taking the noise for the same share of the box in every variable and observations for exact.
+
+        Raises
+        ------
+        InputError
+            If there are neither; it says what to tell.
+        """
+        told, reported = self._trials.successful, self._trials.reported
+        if reported.any():
+            return noise_from_reached(self.box, self._trials.commanded[reported], self._trials.reached[reported])
+        with single_threaded():
+            return noise_from_repeats(self._trials.commanded[told], self._trials.values[told])
+
     @property
     def posterior(self) -> Posterior:
         """The surrogate conditioned on the trials told so far; inputs in the unit cube."""
@@ -361,7 +396,19 @@ class Optimizer:
         previous = self._cache[1] if self._goal.thesis and self._cache is not None else None
         stream = t if self._goal.thesis else 0  # one stream for all: what was learnt from some trials stays as it was
         rng = self._rng(1, stream)
-        posterior = self._surrogate.condition(self._trials.reached, self._trials.modelled, rng, previous)
+        if self._straying and self.input_noise is not None:
+            roots = self.input_noise.unit_roots(self.box, self._trials.commanded).copy()
+            roots[self._trials.reported] = 0.0
+            posterior = condition_on_noisy_inputs(
+                cast("NoisySurrogate", self._surrogate),
+                self._trials.reached,
+                self._trials.modelled,
+                roots,
+                self._known_noise,
+                [self.seed, 1, 0],
+            )
+        else:
+            posterior = self._surrogate.condition(self._trials.reached, self._trials.modelled, rng, previous)
         if self._lattice is not None:
             posterior = LatticePosterior(posterior, self._lattice)
         self._cache = (t, posterior)

@@ -46,6 +46,11 @@ class Trials:
         return np.array(self._reached).reshape(-1, self._box.dimension)
 
     @property
+    def reported(self) -> NDArray[np.bool_]:
+        """Whether the reached input of each trial was told and is another one, (t,)."""
+        return np.any(self.commanded != self.reached, axis=1)
+
+    @property
     def values(self) -> NDArray[np.float64]:
         """Values, (t,); NaN for failed trials."""
         return np.array(self._values, dtype=np.float64)
