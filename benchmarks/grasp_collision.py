@@ -3,7 +3,8 @@
 The same optimization, seed by seed, with a hand that collides while open worth 0 or worth a penalty that grows with
 the penetration. Robust optimization (input noise 0.03) over dx, dy, dz from a Latin hypercube of 20 trials. At several
 numbers of trials the recommended input is scored by 200 re-queries under the noise, with collisions worth 0 for both:
-means over the seeds with standard errors, the paired difference, and the share of the trials that collided.
+means over the seeds with standard errors, the paired difference, and the share of the trials that collided. `saved` is
+how many trials earlier the mean with the penalty reaches what the mean without it has at the last check.
 """
 
 import sys
@@ -13,7 +14,7 @@ import numpy as np
 import surehold as sh
 from surehold.optimization.threads import single_threaded
 
-SEEDS, INITIAL, CHECKS = 12, 20, (30, 45, 60, 80)
+SEEDS, INITIAL, CHECKS = 30, 20, (30, 40, 50, 60, 70, 80)
 VARIABLES = ("dx", "dy", "dz")
 
 
@@ -40,6 +41,9 @@ def main(names):
     for name in names:
         ruler = sh.problems.Grasp(name, variables=VARIABLES, collision="zero")
         rows = {c: np.array([run(name, c, seed, noise, ruler) for seed in range(SEEDS)]) for c in ("zero", "penalty")}
+        means = {c: table.mean(axis=0)[:-1] for c, table in rows.items()}
+        reached = np.flatnonzero(np.maximum.accumulate(means["penalty"]) >= means["zero"].max())
+        print(f"{name:8} saved {CHECKS[-1] - CHECKS[reached[0]] if len(reached) else 'none'}", flush=True)
         rows["penalty - zero"] = rows["penalty"] - rows["zero"]
         for label, table in rows.items():
             error = table.std(axis=0, ddof=1) / np.sqrt(SEEDS)
