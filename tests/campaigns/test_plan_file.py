@@ -72,10 +72,14 @@ def test_a_plan_from_python(tmp_path, cheap):
         "    return Plan('mine', 't', {'a': ProblemSetup('rkhs', 8, 5)}, {'m': MethodSetup('random')})\n"
         "def other():\n"
         "    return 3\n"
+        "def broken():\n"
+        "    return 1 / 0\n"
     )
     assert load_plan(f"{tmp_path}/mine.py:plan").name == "mine"
     with pytest.raises(InputError, match="returned a int"):
         load_plan(f"{tmp_path}/mine.py:other")
+    with pytest.raises(InputError, match="raised ZeroDivisionError"):
+        load_plan(f"{tmp_path}/mine.py:broken")
     with pytest.raises(InputError, match="did you mean 'plan'"):
         load_plan(f"{tmp_path}/mine.py:plant")
 

@@ -201,6 +201,9 @@ def test_bad_arguments_are_refused(tmp_path, cheap):
             run_campaign(cheap, tmp_path, **arguments)
     with pytest.raises(InputError, match="did you mean 'dask'"):
         checked_backend("dusk")
+    for settings in ({"criterion": "eii"}, {"risk": "wurst"}, {"surrogate": "tgp", "min_leaf": -1}):
+        with pytest.raises(InputError, match="method 'odd'"):
+            run_campaign(replace(cheap, methods={"odd": MethodSetup(robust=True, settings=settings)}), tmp_path)
     assert not list(tmp_path.iterdir())
 
 

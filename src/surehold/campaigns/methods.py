@@ -19,7 +19,7 @@ from surehold.optimization.optimizer import SURROGATES, Optimizer
 from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
 from surehold.optimization.risk import Risk
 
-__all__ = ["METHODS", "Method", "build_method", "checked_settings"]
+__all__ = ["METHODS", "Method", "build_method", "checked_method", "checked_settings"]
 
 #: Optimizers that a plan may name.
 METHODS: Final = ("surehold", *PEERS)
@@ -106,6 +106,21 @@ def build_method(cell: Cell, dimension: int, initial: NDArray[np.float64], seed:
         raise InputError(f"method '{cell.method}' needs {missing}; install them: pip install 'surehold[peers]'.")
     extra = {} if noise is None else {"noise": noise}
     return PEERS[cell.by.optimizer](dimension, initial, seed, **extra)
+
+
+def checked_method(cell: Cell) -> None:
+    """Check the values of a cell's settings, and that its library is installed, before anything is run.
+
+    Raises
+    ------
+    InputError
+        That names the method.
+    """
+    try:
+        build_method(cell, 2, np.full((1, 2), 0.5), 0)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if cell.method in text else f"method '{cell.method}': {text}") from None
 
 
 def checked_settings(where: str, optimizer: str, settings: Mapping[str, Any], robust: bool) -> None:

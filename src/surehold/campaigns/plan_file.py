@@ -37,8 +37,13 @@ def load_plan(reference: str) -> Plan:
     if colon and place.endswith(".py"):
         from surehold.problems.function import load_function
 
-        plan: Any = load_function(reference)
-        plan = plan() if not isinstance(plan, Plan) else plan
+        make: Any = load_function(reference)
+        try:
+            plan = make()
+        except InputError:
+            raise
+        except Exception as error:  # whatever a user's function raises is told as bad input
+            raise InputError(f"{reference} raised {type(error).__name__}: {error}") from error
         if not isinstance(plan, Plan):
             raise InputError(f"{reference} returned a {type(plan).__name__}; return a surehold.campaigns.plan.Plan.")
         return _checked(plan)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
+from surehold.campaigns.methods import checked_method
 from surehold.campaigns.plan import Plan, Task
 from surehold.campaigns.single_run import run_once
 from surehold.campaigns.table import Records, opened
@@ -88,7 +89,7 @@ def run_campaign(
     Raises
     ------
     InputError
-        For bad arguments; for tables that another process writes or another version or plan has written.
+        For bad arguments and settings; for tables that another process writes or another version or plan has written.
     SureholdError
         If the table cannot be written, or a worker process dies.
     """
@@ -96,6 +97,8 @@ def run_campaign(
         raise InputError(f"workers is {workers!r}; give a whole number of 1 or more.")
     kind, _ = checked_backend(backend)
     tasks = plan.tasks(runs, shard, only)
+    for cell in plan.cells(only):
+        checked_method(cell)
     with opened(folder, plan, shard) as table:
         records = table.records
         have = records.done if retry else records.rows
