@@ -72,8 +72,8 @@ class GaussianProcessPosterior:
             np.exp(theta[:, -1]) if evidence.learn_noise else np.zeros(m),
         )
         self._Y: Final = np.ascontiguousarray(np.broadcast_to(evidence.y, (m, n)) if Y is None else Y)
-        self._factors: Final = factors or self._factorized()
-        self.diagnostics: Final = FitDiagnostics(n, cost, self._factors.repaired, outputs.flat)
+        self.factors: Final = factors or self._factorized()
+        self.diagnostics: Final = FitDiagnostics(n, cost, self.factors.repaired, outputs.flat)
         self.regions: Final = Regions.whole(d)
 
     def _factorized(self) -> Factors:
@@ -99,7 +99,7 @@ class GaussianProcessPosterior:
 
     def surprise(self, k: int) -> float:
         """Return how much the trials after the first k contradict the particles, in standard deviations."""
-        return surprise(self._factors.inverse_L, self._Y, k)
+        return surprise(self.factors.inverse_L, self._Y, k)
 
     @property
     def length_scales(self) -> NDArray[np.float64]:
@@ -130,8 +130,8 @@ class GaussianProcessPosterior:
             self.hyperparameters.s2,
             self.evidence.mean_variance,
             self.evidence.kernel,
-            self._factors.inverse_L,
-            self._factors.alpha,
+            self.factors.inverse_L,
+            self.factors.alpha,
             gradient,
         )
         scale = self.outputs.scale
@@ -156,8 +156,8 @@ class GaussianProcessPosterior:
             self.hyperparameters.s2,
             self.evidence.mean_variance,
             self.evidence.kernel,
-            self._factors.inverse_L,
-            self._factors.alpha,
+            self.factors.inverse_L,
+            self.factors.alpha,
         )
         return self.outputs.shift + self.outputs.scale * draws
 
@@ -173,9 +173,9 @@ class GaussianProcessPosterior:
             self._Y[every],
             self.log_noise,
             Factors(
-                np.ascontiguousarray(self._factors.inverse_L[every]),
-                np.ascontiguousarray(self._factors.alpha[every]),
-                self._factors.repaired,
+                np.ascontiguousarray(self.factors.inverse_L[every]),
+                np.ascontiguousarray(self.factors.alpha[every]),
+                self.factors.repaired,
             ),
         )
 

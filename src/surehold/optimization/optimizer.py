@@ -74,7 +74,8 @@ class Optimizer:
         (lowest, highest) value to expect, if known.
     quadrature
         How the input noise is averaged over: "unscented" (default of the criteria averaged over sigma points),
-        "scaled_unscented", "central_difference", "gauss_hermite" or "quasi_monte_carlo" (default of the robust ones).
+        "scaled_unscented", "central_difference", "gauss_hermite" or "quasi_monte_carlo" (default of the robust ones);
+        "closed_form" for a GaussianProcess with the squared-exponential kernel.
     k
         Free parameter of the unscented transformation.
     border

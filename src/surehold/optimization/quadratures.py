@@ -61,7 +61,7 @@ def quadrature(
         return gauss_hermite(covariance, bounded=bounded)
     if name == "quasi_monte_carlo":
         return quasi_monte_carlo(covariance, exponent, bounded)
-    raise unknown_name("quadrature", name, QUADRATURES)
+    raise unknown_name("quadrature", name, (*QUADRATURES, "closed_form"))
 
 
 def exact(dimension: int) -> Quadrature:

@@ -14,8 +14,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import unknown_name
+from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
+from surehold.optimization.closed_form import closed_form
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.quadratures import Quadrature, exact, quadrature
 from surehold.optimization.surrogate import Moments, Posterior
@@ -38,6 +39,8 @@ class Perturbations:
     border: str = "extend"
     root: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     """for noise that varies: points (q, d) -> roots of the covariances there, (q, d, d)"""
+    covariance: NDArray[np.float64] | None = None
+    """(d, d) where outcomes are computed in closed form; the quadrature then serves everything else"""
 
     def __post_init__(self) -> None:
         if self.border not in BORDERS:
@@ -58,6 +61,13 @@ class Perturbations:
         if noise is None:
             return cls(exact(box.dimension), border)
         covariance = noise.unit_covariance(box)
+        if rule == "closed_form":
+            if noise.bounded or noise.varies or border != "extend":
+                raise InputError(
+                    "the quadrature 'closed_form' is for Gaussian noise that is the same everywhere and the border "
+                    "rule 'extend'; choose another quadrature."
+                )
+            return cls(quadrature("quasi_monte_carlo", covariance), border, None, covariance)
         if not noise.varies:
             return cls(quadrature(rule, covariance, k, bounded=noise.bounded, exponent=exponent), border)
         standard = np.diag((np.diag(covariance) > 0.0).astype(np.float64))
@@ -70,6 +80,8 @@ class Perturbations:
 
     def outcome(self, posterior: Posterior, U: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of g at U (q, d) under each particle."""
+        if self.covariance is not None:
+            return closed_form(posterior, U, self.covariance, gradient)
         offsets, slopes = self._at(U)
         return posterior.average(U, offsets, self.quadrature.weights, gradient, slopes)
 
