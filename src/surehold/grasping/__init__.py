@@ -4,9 +4,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from surehold.grasping.batch import GraspBatch, grasp_batch
     from surehold.grasping.closing import CLOSING_MODES
     from surehold.grasping.contacts import CONTACT_MODELS, Contacts
     from surehold.grasping.distance_field import DistanceField, distance_field_of
+    from surehold.grasping.dynamics import GraspCheck, GraspChecker
     from surehold.grasping.formats import GraspFile, StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
     from surehold.grasping.friction_cones import contact_wrenches, soft_finger_torsion
     from surehold.grasping.grasp import COLLISIONS, STATUSES, Grasp, Simulator
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from surehold.grasping.inscribed_ball import ball_radius
     from surehold.grasping.linear_programs import force_closure, gravity_wrenches, task_quality
     from surehold.grasping.meshes import OBJECTS, GraspObject, shipped_object
+    from surehold.grasping.pose_noise import PoseNoise, RobustQuality, robust_quality
     from surehold.grasping.poses import FACETS, MODES, Pose, default_pose
     from surehold.grasping.quality import QUALITIES
     from surehold.grasping.scene import Scene, SceneMesh, grasp_scene
@@ -23,13 +26,16 @@ if TYPE_CHECKING:
     from surehold.grasping.wrench_space import WrenchQuality, wrench_quality
 
 _HOMES = {
-    "COLLISIONS": "grasp",
     "CLOSING_MODES": "closing",
+    "COLLISIONS": "grasp",
     "CONTACT_MODELS": "contacts",
     "Contacts": "contacts",
     "DistanceField": "distance_field",
     "FACETS": "poses",
     "Grasp": "grasp",
+    "GraspBatch": "batch",
+    "GraspCheck": "dynamics",
+    "GraspChecker": "dynamics",
     "GraspFile": "formats",
     "GraspObject": "meshes",
     "HANDS": "hands",
@@ -38,8 +44,10 @@ _HOMES = {
     "OBJECTS": "meshes",
     "ObjectWrenchSpace": "simox",
     "Pose": "poses",
+    "PoseNoise": "pose_noise",
     "Preshape": "hand",
     "QUALITIES": "quality",
+    "RobustQuality": "pose_noise",
     "STATUSES": "grasp",
     "Scene": "scene",
     "SceneMesh": "scene",
@@ -51,6 +59,7 @@ _HOMES = {
     "default_pose": "poses",
     "distance_field_of": "distance_field",
     "force_closure": "linear_programs",
+    "grasp_batch": "batch",
     "grasp_scene": "scene",
     "grasp_to_dict": "formats",
     "gravity_wrenches": "linear_programs",
@@ -59,6 +68,7 @@ _HOMES = {
     "icub_right_hand": "icub_hand",
     "object_wrench_space": "simox",
     "read_isaac_grasps": "formats",
+    "robust_quality": "pose_noise",
     "shipped_object": "meshes",
     "simox_quality": "simox",
     "soft_finger_torsion": "friction_cones",
@@ -80,12 +90,17 @@ __all__ = [
     "Contacts",
     "DistanceField",
     "Grasp",
+    "GraspBatch",
+    "GraspCheck",
+    "GraspChecker",
     "GraspFile",
     "GraspObject",
     "Hand",
     "ObjectWrenchSpace",
     "Pose",
+    "PoseNoise",
     "Preshape",
+    "RobustQuality",
     "Scene",
     "SceneMesh",
     "Simulator",
@@ -96,6 +111,7 @@ __all__ = [
     "default_pose",
     "distance_field_of",
     "force_closure",
+    "grasp_batch",
     "grasp_scene",
     "grasp_to_dict",
     "gravity_wrenches",
@@ -104,6 +120,7 @@ __all__ = [
     "icub_right_hand",
     "object_wrench_space",
     "read_isaac_grasps",
+    "robust_quality",
     "shipped_object",
     "simox_quality",
     "soft_finger_torsion",

@@ -1,7 +1,7 @@
 """One trial: put the open hand at a pose, close it, find the contacts, measure how well they hold the object."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -256,6 +256,13 @@ class Simulator:
         from surehold.grasping.scene import grasp_scene  # pictures stand on grasps, not the other way round
 
         return grasp_scene(self, grasp, opened)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "field"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # In a worker process the distance field is read from the cache, not sent along.
+        self.__dict__.update(state, field=distance_field_of(state["object"]))
 
     def _collision(self, depth: float) -> float:
         """Return the worth of an open hand whose bodies are inside the object by `depth` together [m]."""

@@ -1,0 +1,150 @@
+"""What a grasp is worth when hand or object are not exactly where they were thought to be.
+
+    d    shift along the three axes, m       c    grasp center of the hand, about which turns are made
+    a    turns about the three axes, rad     D    the disturbance x -> c + Rx(a1) Ry(a2) Rz(a3) (x - c) + d
+
+All six numbers are normal with standard deviation bound / 3, truncated at the bounds, ±10 mm and ±5 degrees by default:
+the disturbance under which grasp simulators commonly score robustness. Either the hand is disturbed in its own frame,
+or the object in the world. The draws depend on (n, seed) alone: grasps that are compared are shaken in the same way.
+"""
+
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError, unknown_name
+from surehold.grasping.batch import grasp_batch
+from surehold.grasping.grasp import STATUSES, Simulator
+from surehold.grasping.poses import Pose
+
+__all__ = ["DISTURBED", "PoseNoise", "RobustQuality", "disturbed_poses", "robust_quality"]
+
+Array = NDArray[np.float64]
+
+DISTURBED: Final = ("hand", "object")
+_TRUNCATION = 3.0  # standard deviations
+
+
+class PoseNoise(NamedTuple):
+    """Bounds of the disturbance, each three standard deviations."""
+
+    shift: float = 0.010  #: along each axis [m]
+    turn: float = float(np.radians(5.0))  #: about each axis [rad]
+
+
+@dataclass(frozen=True, eq=False)
+class RobustQuality:
+    """Outcomes of n disturbed trials of one grasp. A hand that collides while open counts as quality 0."""
+
+    mean: float  #: of all trials
+    std: float  #: sample standard deviation (divisor n - 1) of all trials
+    worst: float  #: lowest of all trials
+    closure_rate: float  #: share of all trials in force closure
+    collision_rate: float  #: share of the trials whose open hand collides
+    mean_free: float  #: mean of the trials without collision; NaN if all collide
+    closure_rate_free: float  #: share of force closure among the trials without collision; NaN if all collide
+    values: Array  #: (n,) qualities, those of collisions 0
+
+    def quantile(self, level: float) -> float:
+        """Return the quality below which the share `level` (0 to 1) of the trials lies; InputError outside [0, 1]."""
+        if not 0.0 <= level <= 1.0:
+            raise InputError(f"quantile level is {level!r}; give a share from 0 to 1, such as 0.05.")
+        return float(np.quantile(self.values, level))
+
+
+def robust_quality(
+    simulator: Simulator,
+    pose: Pose,
+    s1: float = 0.0,
+    *,
+    noise: PoseNoise | None = None,
+    n: int = 100,
+    seed: int = 0,
+    disturbed: Literal["hand", "object"] = "hand",
+    workers: int = 1,
+) -> RobustQuality:
+    """Return what the grasp at a pose of the palm in the world is worth under a noise of the pose.
+
+    Parameters
+    ----------
+    simulator, pose, s1, workers
+        As in `grasp_batch`.
+    noise
+        Bounds of the disturbance; ±10 mm and ±5 degrees if not given.
+    n
+        Number of trials.
+    seed
+        Of the draws.
+    disturbed
+        "hand": its pose, in its own frame about its grasp center; "object": its pose, in the world about that point.
+
+    Raises
+    ------
+    InputError
+        If n is not a positive integer, a bound is negative or not finite, a name is unknown, or the pose is not finite.
+    """
+    poses = disturbed_poses(simulator, pose, noise, n, seed, disturbed)
+    batch = grasp_batch(simulator, poses, s1, workers)
+    collided = batch.status == STATUSES.index("initial collision")
+    closed = batch.status == STATUSES.index("ok")
+    values = np.where(collided, 0.0, batch.quality)
+    some = not np.all(collided)
+    return RobustQuality(
+        mean=float(values.mean()),
+        std=float(values.std(ddof=1)) if n > 1 else 0.0,
+        worst=float(values.min()),
+        closure_rate=float(closed.mean()),
+        collision_rate=float(collided.mean()),
+        mean_free=float(values[~collided].mean()) if some else np.nan,
+        closure_rate_free=float(closed[~collided].mean()) if some else np.nan,
+        values=values,
+    )
+
+
+def disturbed_poses(
+    simulator: Simulator,
+    pose: Pose,
+    noise: PoseNoise | None = None,
+    n: int = 100,
+    seed: int = 0,
+    disturbed: Literal["hand", "object"] = "hand",
+) -> list[Pose]:
+    """Return the n poses of the palm that `robust_quality` tries, in the world and relative to the object as it stands.
+
+    A disturbance of the object is undone on the hand: only where they are to each other matters.
+    """
+    from scipy.special import ndtr, ndtri
+
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+        raise InputError(f"number of disturbed trials is {n!r}; give an integer of 1 or more.")
+    if disturbed not in DISTURBED:
+        raise unknown_name("disturbed body", disturbed, DISTURBED)
+    bounds = noise or PoseNoise()
+    if not all(np.isfinite(b) and b >= 0.0 for b in bounds):
+        raise InputError(f"pose noise is {bounds}; give bounds of 0 or more, in meters and radians.")
+    share = np.random.default_rng(seed).random((int(n), 6))
+    low = ndtr(-_TRUNCATION)
+    draws = ndtri(low + share * (1.0 - 2.0 * low)) / _TRUNCATION  # in [-1, 1]
+    center = np.asarray(simulator.hand.grasp_center)
+    poses = []
+    for draw in draws:
+        shift, turn = bounds.shift * draw[:3], bounds.turn * draw[3:]
+        if disturbed == "hand":
+            poses.append(pose @ _about(center, shift, turn))
+        else:
+            poses.append(_about(pose.apply(center), shift, turn).inverse() @ pose)
+    return poses
+
+
+def _about(center: Array, shift: Array, turn: Array) -> Pose:
+    """Return the motion D."""
+    rotation = np.eye(3)
+    for axis, angle in enumerate(turn):
+        c, s = np.cos(angle), np.sin(angle)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        step = np.eye(3)
+        step[i, i], step[j, j], step[i, j], step[j, i] = c, c, -s, s
+        rotation = rotation @ step
+    return Pose.from_matrix(np.column_stack([rotation, center - rotation @ center + shift]))

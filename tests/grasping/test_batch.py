@@ -1,0 +1,69 @@
+import pickle
+
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.grasping import OBJECTS, STATUSES, Simulator, default_pose, grasp_batch
+
+
+def random_poses(simulator, n, seed):
+    rng, half = np.random.default_rng(seed), simulator.object.box_half_extents
+    modes = ("right-front", "front-left", "top-left", "back-top")
+    poses = [
+        default_pose(
+            simulator.hand,
+            simulator.object,
+            modes[rng.integers(4)],
+            float(rng.uniform(0.01, 0.09)),
+            rng.uniform(-1, 1, 6) * np.array([0.09, half[2], 0.02, 0.7, 0.7, 0.7]),
+        )
+        for _ in range(n)
+    ]
+    return poses, rng.uniform(-np.pi, np.pi, n)
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_a_batch_is_its_trials_and_sound(name):
+    simulator = Simulator(obj=name)
+    poses, s1 = random_poses(simulator, 120, 1)
+    batch = grasp_batch(simulator, poses, s1)
+    assert len(batch) == 120
+    assert np.all(np.isfinite(batch.quality))
+    assert sum(batch.shares().values()) == pytest.approx(1.0)
+    assert np.mean(batch.fallbacks > 0) < 0.02
+    for i in range(0, 120, 17):
+        grasp = simulator.grasp(poses[i], float(s1[i]))
+        assert batch.quality[i] == grasp.quality
+        assert STATUSES[batch.status[i]] == grasp.status
+        assert batch.penetration[i] == grasp.penetration
+        assert batch.contacts[i] == len(grasp.contacts)
+
+
+def test_the_number_of_workers_changes_nothing():
+    simulator = Simulator(obj="mug")
+    poses, s1 = random_poses(simulator, 230, 2)
+    alone, together = (grasp_batch(simulator, poses, s1, workers=w) for w in (1, 2))
+    for name in ("quality", "status", "penetration", "contacts", "fallbacks"):
+        np.testing.assert_array_equal(getattr(alone, name), getattr(together, name), err_msg=name)
+
+
+def test_a_simulator_travels_without_its_distance_field():
+    simulator = Simulator(obj="bottle", contact="single", friction=0.4)
+    content = pickle.dumps(simulator)
+    assert len(content) < 2_000_000 < simulator.field.nodes.nbytes
+    copy = pickle.loads(content)
+    pose = default_pose(simulator.hand, simulator.object, "right-front", 0.0087, (-0.03, *[0.0] * 5))
+    assert copy.grasp(pose, -0.7).quality == simulator.grasp(pose, -0.7).quality > 0.0
+
+
+def test_empty_and_bad_input():
+    simulator = Simulator(obj="bottle")
+    assert len(grasp_batch(simulator, [])) == 0
+    poses, _ = random_poses(simulator, 3, 3)
+    with pytest.raises(InputError, match="workers are 0"):
+        grasp_batch(simulator, poses, workers=0)
+    with pytest.raises(InputError, match=r"s1 has shape \(2,\)"):
+        grasp_batch(simulator, poses, [0.0, 1.0])
+    with pytest.raises(InputError, match="finite"):
+        grasp_batch(simulator, poses, float("nan"))

@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+from scipy import stats
+
+from surehold.errors import InputError
+from surehold.grasping import Pose, PoseNoise, Simulator, default_pose, robust_quality
+from surehold.grasping.pose_noise import disturbed_poses
+
+
+@pytest.fixture(scope="module")
+def bottle():
+    return Simulator(obj="bottle")
+
+
+def pose_at(simulator, dx):
+    return default_pose(simulator.hand, simulator.object, "right-front", 0.0087, (dx, *[0.0] * 5))
+
+
+def shifts(simulator, pose, poses):
+    """Shift of the grasp center in the hand's frame, (n, 3), and turn angles, (n,)."""
+    center = simulator.hand.grasp_center
+    moved = np.array([pose.inverse().apply(p.apply(center)) - center for p in poses])
+    turned = [np.arccos(np.clip((np.trace(pose.rotation.T @ p.rotation) - 1.0) / 2.0, -1.0, 1.0)) for p in poses]
+    return moved, np.array(turned)
+
+
+def test_the_disturbance_is_a_truncated_normal_about_the_grasp_center(bottle):
+    pose = pose_at(bottle, -0.03)
+    moved, turned = shifts(bottle, pose, disturbed_poses(bottle, pose, n=4000))
+    assert np.abs(moved).max() <= 0.010
+    assert turned.max() <= np.radians(5.0) * np.sqrt(3.0) + 1e-9
+    for axis in range(3):
+        assert stats.kstest(moved[:, axis], stats.truncnorm(-3, 3, scale=0.010 / 3).cdf).pvalue > 1e-3
+    only_turns, _ = shifts(bottle, pose, disturbed_poses(bottle, pose, PoseNoise(shift=0.0), n=50))
+    np.testing.assert_allclose(only_turns, 0.0, atol=1e-12)
+
+
+def test_draws_are_common_and_without_noise_all_trials_are_alike(bottle):
+    first, second = pose_at(bottle, -0.03), pose_at(bottle, -0.035)
+    a, b = (shifts(bottle, p, disturbed_poses(bottle, p, n=20, seed=7)) for p in (first, second))
+    np.testing.assert_allclose(a[0], b[0], atol=1e-12)
+    still = robust_quality(bottle, first, -0.7, noise=PoseNoise(0.0, 0.0), n=5)
+    exact = bottle.grasp(first, -0.7).quality
+    assert still.std == pytest.approx(0.0, abs=1e-6)
+    assert still.mean == pytest.approx(exact, rel=1e-4)
+
+
+def test_numbers_are_those_of_the_trials(bottle):
+    pose = pose_at(bottle, -0.017)
+    found = robust_quality(bottle, pose, -0.7, n=60, seed=1)
+    grasps = [bottle.grasp(p, -0.7) for p in disturbed_poses(bottle, pose, n=60, seed=1)]
+    collided = np.array([g.status == "initial collision" for g in grasps])
+    values = np.array([max(g.quality, 0.0) for g in grasps])
+    assert 0.0 < found.collision_rate == collided.mean() < 1.0
+    assert found.mean == values.mean()
+    assert found.mean_free == pytest.approx(values[~collided].mean())
+    assert found.mean_free > found.mean
+    assert found.std == pytest.approx(np.std(values, ddof=1))
+    assert found.worst == values.min() == 0.0
+    assert found.closure_rate == np.mean([g.status == "ok" for g in grasps])
+    assert found.closure_rate_free == pytest.approx(np.mean([g.status == "ok" for g in grasps]) / (1 - collided.mean()))
+    assert found.quantile(0.5) == np.quantile(values, 0.5)
+    again = robust_quality(bottle, pose, -0.7, n=60, seed=1)
+    np.testing.assert_array_equal(again.values, found.values)
+
+
+def test_disturbing_the_object_is_undoing_it_on_the_hand(bottle):
+    motion = Pose((0.1, 0.2, -0.3), (0.5, 0.5, 0.5, -0.5))
+    there = Simulator(obj="bottle", object_pose=motion)
+    pose = motion @ pose_at(there, -0.03)
+    for moved in disturbed_poses(there, pose, n=5, disturbed="object"):
+        shift = moved @ pose.inverse()
+        # the same relative pose, with the object moved the other way and the hand in place
+        other = Simulator(obj="bottle", object_pose=shift.inverse() @ motion)
+        assert other.grasp(pose, -0.7).quality == pytest.approx(there.grasp(moved, -0.7).quality, abs=1e-6)
+        assert (
+            np.linalg.norm(np.array(moved.apply(there.hand.grasp_center)) - pose.apply(there.hand.grasp_center)) < 0.018
+        )
+
+
+def test_a_grasp_beside_a_collision_is_worth_less(bottle):
+    safe, brink = (robust_quality(bottle, pose_at(bottle, x), -0.7, n=80) for x in (-0.030, -0.014))
+    assert safe.closure_rate > brink.closure_rate
+    assert safe.mean > brink.mean
+    assert brink.collision_rate > 0.1
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"n": 0}, "number of disturbed trials is 0"),
+        ({"noise": PoseNoise(shift=-1.0)}, "pose noise"),
+        ({"disturbed": "table"}, "hand, object"),
+        ({"workers": 0}, "workers are 0"),
+    ],
+)
+def test_bad_options_are_explained(bottle, options, words):
+    with pytest.raises(InputError, match=words):
+        robust_quality(bottle, pose_at(bottle, -0.03), -0.7, **options)
