@@ -20,6 +20,11 @@ class ExactMesh:
         core = coal.Box(*(2.0 * (half_extents - rounding)))
         return self._distance(core, coal.Transform3s(pose[:, :3], pose[:, 3])) - rounding
 
+    @staticmethod
+    def between(shape, transform, near, far, radius):
+        """Distance of any shape to a capsule."""
+        return coal.distance(shape, transform, *capsule(near, far, radius), coal.DistanceRequest(), result())
+
     def _distance(self, shape, transform):
         return coal.distance(shape, transform, self.mesh, coal.Transform3s(), coal.DistanceRequest(), result())
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from exact_closing import ExactClosing
 from exact_mesh import ExactMesh, capsule_pair
 
 from surehold.grasping.closing import TOUCH
@@ -121,3 +122,17 @@ def test_repetition_is_bit_identical():
         assert again.quality == grasp.quality
         np.testing.assert_array_equal(again.joints, grasp.joints)
         np.testing.assert_array_equal(again.contacts.points, grasp.contacts.points)
+
+
+@pytest.mark.parametrize("name", ["mug", "drill"])
+def test_closing_angles_equal_those_of_an_exact_distance_library(name):
+    """The whole closing repeated with coal's distances to the mesh: the angles agree but for hits that are misses."""
+    simulator = Simulator(obj=name, contact="single")
+    mode, standoff = ("right-front", 0.02) if name == "mug" else ("front-left", 0.03)
+    exact = ExactClosing(simulator)
+    found = [
+        np.abs(grasp.joints - exact.joints(pose, s1)).max()
+        for pose, s1, grasp in trials(simulator, mode, standoff, 6, 8)
+    ]
+    assert np.median(found) < 0.003
+    assert np.sort(found)[-2] < 0.01
