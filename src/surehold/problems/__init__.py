@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from surehold.problems.grasp import Grasp
     from surehold.problems.perturbation import RobustScore, perturbed_points, robust_score
     from surehold.problems.problem import Optimum, Problem
+    from surehold.problems.robust import RobustProblem, robust_problem
     from surehold.problems.synthetic import GF, GM, RKHS, GaussianBumps, robust_optimum, synthetic_function
 
 __all__ = [
@@ -19,11 +20,13 @@ __all__ = [
     "Grasp",
     "Optimum",
     "Problem",
+    "RobustProblem",
     "RobustScore",
     "load_function",
     "parse_bounds",
     "perturbed_points",
     "robust_optimum",
+    "robust_problem",
     "robust_score",
     "synthetic_function",
 ]
@@ -38,6 +41,8 @@ _HOMES = {
     "robust_score": "perturbation",
     "Optimum": "problem",
     "Problem": "problem",
+    "RobustProblem": "robust",
+    "robust_problem": "robust",
     "GF": "synthetic",
     "GM": "synthetic",
     "RKHS": "synthetic",
