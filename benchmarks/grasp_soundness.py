@@ -44,8 +44,9 @@ def trials(names):
             alone, together = batches
             same = all(np.array_equal(getattr(alone, k), getattr(together, k)) for k in vars(alone))
             shares = ", ".join(f"{k} {v:.3f}" for k, v in alone.shares().items())
+            finite = np.isfinite(alone.quality).all()
             print(
-                f"{name:8} {contact:8} {minute[0]:7.0f} {minute[1]:8.0f}  {np.isfinite(alone.quality).all()!s:6} {same!s:4}"
+                f"{name:8} {contact:8} {minute[0]:7.0f} {minute[1]:8.0f} {finite!s:>7} {same!s:4}"
                 f" {alone.fallbacks.sum():9d}  {shares}",
                 flush=True,
             )
