@@ -16,7 +16,7 @@ import yaml
 
 from surehold.errors import InputError
 
-__all__ = ["GraspFile", "StoredGrasp", "grasp_to_dict", "read_isaac_grasps", "write_isaac_grasps"]
+__all__ = ["GraspFile", "StoredGrasp", "grasp_to_dict", "plain_yaml", "read_isaac_grasps", "write_isaac_grasps"]
 
 FORMAT = "isaac_grasp"
 VERSION = 1.0
@@ -92,18 +92,7 @@ def read_isaac_grasps(path: str | Path) -> GraspFile:
     Raises InputError, naming the place, if the file cannot be read or is not an `isaac_grasp` of version 1.0.
     """
     where = str(path)
-    try:
-        if Path(path).stat().st_size > MAX_BYTES:
-            raise InputError(f"{where!r} is larger than {MAX_BYTES // 2**20} MB; split it into several files.")
-        content = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_PlainLoader)
-    except OSError as error:
-        raise InputError(f"cannot read {where!r}: {error.strerror}.") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{where!r} is not a text file in UTF-8; give an Isaac grasp YAML file.") from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{where!r} is not plain YAML: {' '.join(str(error).split())}") from None
+    content = plain_yaml(path)
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise InputError(f"{where!r} is not an Isaac grasp file; its first line must be 'format: {FORMAT}'.")
     version = content.get("format_version")
@@ -137,6 +126,26 @@ def read_isaac_grasps(path: str | Path) -> GraspFile:
         str(content.get(f"{kind}_frame", content.get(f"{kind}_frame_link", ""))) for kind in ("object", "gripper")
     ]
     return GraspFile(frames[0], frames[1], tuple(grasps))
+
+
+def plain_yaml(path: str | Path) -> Any:
+    """Return the content of a YAML file that holds data only: no tags, no aliases, no key twice, at most 64 MB.
+
+    Raises InputError if the file cannot be read or is anything else.
+    """
+    where = str(path)
+    try:
+        if Path(path).stat().st_size > MAX_BYTES:
+            raise InputError(f"{where!r} is larger than {MAX_BYTES // 2**20} MB; split it into several files.")
+        return yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_PlainLoader)
+    except OSError as error:
+        raise InputError(f"cannot read {where!r}: {error.strerror}.") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{where!r} is not a text file in UTF-8; give a YAML file.") from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{where!r} is not plain YAML: {' '.join(str(error).split())}") from None
 
 
 def grasp_to_dict(value: object) -> Any:

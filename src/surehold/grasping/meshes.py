@@ -1,12 +1,13 @@
 """The shipped objects, built from solids: the mug, the bottle, the glass and the drill.
 
 Each object stands in its own frame: z up, x to the right, y to the front, the origin on its axis at the foot.
-Facets of its box: right +x, left -x, front +y, back -y, top +z, bottom -z.
+Facets of its box: right +x, left -x, front +y, back -y, top +z, bottom -z. The box of a mesh of one's own has axes of
+its own (mesh_files.py), and its facets are named after these.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from typing import Final
 
 import numpy as np
@@ -29,6 +30,7 @@ class GraspObject:
     center_of_mass: NDArray[np.float64]  #: (3,) m
     friction: float = 0.5  #: coefficient of friction at a contact with the hand
     solids: tuple[Solid, ...] = field(default=(), repr=False)  #: the exact solids; empty for a mesh read from a file
+    axes: NDArray[np.float64] = field(default_factory=lambda: np.eye(3), repr=False)  #: (3, 3) columns: axes of its box
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.friction) and self.friction > 0.0):
@@ -38,18 +40,25 @@ class GraspObject:
 
     @property
     def box_center(self) -> NDArray[np.float64]:
-        """Center (3,) of the object's box, whose axes are those of the object's own frame [m]."""
-        return 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
+        """Center (3,) of the object's box in the object's frame [m]."""
+        lower, upper = self._box
+        return self.axes @ (0.5 * (lower + upper))
 
     @property
     def box_half_extents(self) -> NDArray[np.float64]:
-        """Half edge lengths (3,) of the object's box [m]."""
-        return 0.5 * (self.vertices.max(axis=0) - self.vertices.min(axis=0))
+        """Half edge lengths (3,) of the object's box, along its axes [m]."""
+        lower, upper = self._box
+        return 0.5 * (upper - lower)
 
     @property
     def torque_length(self) -> float:
         """Length by which torques are divided to compare with forces: half of the box's longest edge [m]."""
         return float(self.box_half_extents.max())
+
+    @cached_property
+    def _box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        placed = self.vertices @ self.axes
+        return placed.min(axis=0), placed.max(axis=0)
 
 
 #: name -> (builder of the solids, density [kg/m^3])

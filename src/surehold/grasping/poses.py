@@ -116,7 +116,7 @@ def _turn(axis: int, angle: float) -> Array:
 
 
 def facet_axes(mode: str) -> Array:
-    """Return the palm's axes as columns (3, 3) in the object's frame for a mode such as "right-front".
+    """Return the palm's axes as columns (3, 3) in the frame of the object's box for a mode such as "right-front".
 
     Raises
     ------
@@ -154,7 +154,7 @@ def default_pose(
     InputError
         If the mode is unknown or a number is not finite.
     """
-    axes = facet_axes(mode)
+    axes = obj.axes @ facet_axes(mode)
     d = np.asarray(offsets, dtype=np.float64)
     if d.shape != (6,) or not np.all(np.isfinite(d)) or not np.isfinite(standoff):
         raise InputError(f"pose offsets are {offsets!r} at standoff {standoff!r}; give six finite numbers and one.")

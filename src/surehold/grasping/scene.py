@@ -59,7 +59,7 @@ def grasp_scene(simulator: Simulator, grasp: Grasp, opened: bool = False) -> Sce
         bodies=() if opened else contacts.names,
         friction=simulator.friction,
         box_center=to_world.apply(obj.box_center).astype(np.float32),
-        box_axes=to_world.rotation.astype(np.float32),
+        box_axes=(to_world.rotation @ obj.axes).astype(np.float32),
         box_half_extents=obj.box_half_extents.astype(np.float32),
     )
 
