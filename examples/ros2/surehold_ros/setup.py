@@ -1,0 +1,13 @@
+from setuptools import setup
+
+setup(
+    name="surehold_ros",
+    version="0.1.0",
+    packages=["surehold_ros"],
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/surehold_ros"]),
+        ("share/surehold_ros", ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    entry_points={"console_scripts": ["explorer = surehold_ros.explorer:main"]},
+)

@@ -1,0 +1,1 @@
+"""A node that explores with a study of surehold."""
