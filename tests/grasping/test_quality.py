@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from surehold.grasping import (
+    OBJECTS,
     QUALITIES,
     Simulator,
     contact_wrenches,
@@ -120,3 +121,15 @@ def test_signed_epsilon_tells_how_far_an_open_grasp_is_from_closure():
         points, normals, 0.5, torque_length=BOTTLE.torque_length, origin=BOTTLE.center_of_mass, cones="round"
     ).signed_epsilon
     assert measure.value(contacts, wrench) == expected < 0.0
+
+
+def test_friction_is_the_objects_own_unless_given():
+    assert {name: shipped_object(name).friction for name in OBJECTS} == {
+        "mug": 0.5,
+        "bottle": 0.45,
+        "glass": 0.4,
+        "drill": 0.7,
+    }
+    assert Simulator(obj="glass").measure.friction == 0.4
+    assert Simulator(obj="glass", friction=0.9).measure.friction == 0.9
+    assert held(friction=0.9)[1].quality > held()[1].quality

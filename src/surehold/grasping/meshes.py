@@ -61,8 +61,8 @@ class GraspObject:
         return placed.min(axis=0), placed.max(axis=0)
 
 
-#: name -> (builder of the solids, density [kg/m^3])
-_BUILDERS: dict[str, tuple[Callable[[], tuple[Solid, ...]], float]] = {}
+#: name -> (builder of the solids, density [kg/m^3], friction at a dry finger of elastomer)
+_BUILDERS: dict[str, tuple[Callable[[], tuple[Solid, ...]], float, float]] = {}
 
 
 def _mug() -> tuple[Solid, ...]:
@@ -126,7 +126,12 @@ def _cup(
     )
 
 
-_BUILDERS.update(mug=(_mug, 2300.0), bottle=(_bottle, 1000.0), glass=(_glass, 2500.0), drill=(_drill, 1100.0))
+_BUILDERS.update(
+    mug=(_mug, 2300.0, 0.5),  # glazed
+    bottle=(_bottle, 1000.0, 0.45),  # smooth plastic
+    glass=(_glass, 2500.0, 0.4),
+    drill=(_drill, 1100.0, 0.7),  # a grip of rubber
+)
 
 #: Names of the shipped objects.
 OBJECTS: Final[tuple[str, ...]] = tuple(_BUILDERS)
@@ -143,7 +148,7 @@ def shipped_object(name: str) -> GraspObject:
     """
     if name not in _BUILDERS:
         raise unknown_name("object", name, OBJECTS)
-    build, density = _BUILDERS[name]
+    build, density, friction = _BUILDERS[name]
     solids = build()
     vertices, faces, volume, center = triangles(solids)
-    return GraspObject(name, vertices, faces, density * volume, center, solids=solids)
+    return GraspObject(name, vertices, faces, density * volume, center, friction, solids)
