@@ -60,6 +60,35 @@ def _fill_shares(X, c, out):
         out[0, i], out[1, i] = (large, small) if log_odds < 0.0 else (small, large)
 
 
+@njit(cache=True)
+def _fill_prior(points, tilt, weights, inverse_l, center, variance, slope):
+    """Fill variance (q,) and, where it has room, slope (q, d) with those of weighted sums at points (q, s, d); s2 = 1.
+
+    tilt (q, s, d) are the derivatives of the points' coordinates by the query's.
+    """
+    q, s, d = points.shape
+    C, F = np.empty((s, s)), np.empty((s, s))
+    shares = np.empty((2, s))
+    for i in range(q):
+        P = points[i]
+        _fill_shares(P, center, shares)
+        variance[i] = 0.0
+        for j in range(2):
+            correlation_and_factor(_MATERN52, P, P, inverse_l[j], C, F)
+            sign = 0.5 if j == 1 else -0.5
+            for a in range(s):
+                for b in range(s):
+                    both = weights[a] * weights[b] * shares[j, a] * shares[j, b]
+                    variance[i] += both * C[a, b]
+                    if slope.shape[0] > 0:
+                        other = shares[1 - j, a] * shares[1 - j, a]
+                        for k in range(d):
+                            log_odds = (P[a, k] - 0.5) / _WIDE**2 - (P[a, k] - center[k]) / _NARROW**2
+                            step = (P[a, k] - P[b, k]) * inverse_l[j, k] ** 2
+                            change = sign * other * log_odds * C[a, b] - F[a, b] * step
+                            slope[i, k] += 2.0 * both * change * tilt[i, a, k]
+
+
 @njit(types.float64(types.float64[::1], EVIDENCE_TYPE), cache=True)
 def log_posterior(theta, evidence):
     """Return the log posterior density of theta (3 d + 1,), up to a constant."""
@@ -133,11 +162,17 @@ class _Particle(NamedTuple):
         q, s, d = points.shape
         variance, slope = np.full(q, self.s2 * weights.sum() ** 2), np.zeros((q if gradient else 0, d))
         if s > 1:
-            for i in range(q):
-                own, own_slope = self.covariance(points[i], points[i], gradient)
-                variance[i] = weights @ own @ weights
-                if gradient:
-                    slope[i] = 2.0 * np.einsum("dab,a,b,ad->d", own_slope, weights, weights, tilt[i])
+            _fill_prior(
+                np.ascontiguousarray(points),
+                np.ascontiguousarray(tilt),
+                np.ascontiguousarray(weights),
+                self.inverse_l,
+                self.center,
+                variance,
+                slope,
+            )
+            variance *= self.s2
+            slope *= self.s2
         return variance, slope
 
     def _shares(self, P: NDArray[np.float64]) -> NDArray[np.float64]:
