@@ -45,7 +45,7 @@ def test_import_is_light():
     assert loaded.strip() == "[]", f"`import surehold` loads {loaded}"
 
 
-@pytest.mark.parametrize("package", ["surehold", "surehold.grasping", "surehold.problems"])
+@pytest.mark.parametrize("package", ["surehold", "surehold.grasping", "surehold.problems", "surehold.studies"])
 def test_no_name_hides_behind_a_module_of_the_same_name(package):
     """A submodule becomes an attribute of its package once anything imports it, in place of a function of that name."""
     root = import_module(package)

@@ -390,6 +390,31 @@ def test_a_correlated_noise_survives_the_storage(tmp_path):
     assert np.allclose(found, covariance / np.outer(BOX.widths, BOX.widths), rtol=1e-12)
 
 
+def test_a_bounded_noise_survives_the_storage_and_one_that_varies_is_refused(tmp_path):
+    noise = sh.InputNoise.uniform({"dx": 0.003, "dy": 0.001})
+    settings = StudySettings(SearchSpace(BOX), noise, optimizer={"n_initial": 3})
+    robot = RobotStudy.create("b", settings, str(tmp_path / "j.log"))
+    found = RobotStudy.open("b", robot.storage.url).settings
+    assert found.differences(settings) == []
+    assert found.input_noise.bounded
+    assert np.allclose(found.input_noise.unit_covariance(BOX), noise.unit_covariance(BOX), rtol=1e-12)
+    for _ in range(5):
+        asked = robot.ask()
+        robot.tell(asked.id, quality(asked.parameters))
+    mixed = SearchSpace({"dx": (-0.05, 0.05), "c": CategoricalDistribution("ab")})
+    spread = mixed.input_noise(sh.InputNoise.uniform({"dx": 0.003}))
+    assert spread.bounded
+    assert np.diag(spread.unit_covariance(mixed.box)) == pytest.approx([0.0003, 0.0, 0.0])
+    varying = sh.InputNoise.varying(lambda x: {"dx": 0.001, "dy": 0.001})
+    with pytest.raises(InputError, match="cannot be stored"):
+        StudySettings(SearchSpace(BOX), varying)
+    sampler = sh.Sampler(BOX, input_noise=varying, n_initial=3)
+    study = optuna.create_study(direction="maximize", sampler=sampler)
+    for _ in range(5):
+        trial = study.ask(SearchSpace(BOX).distributions)
+        study.tell(trial, quality(trial.params))
+
+
 def test_a_study_of_a_newer_version_is_refused(robot):
     robot.study.set_user_attr("surehold:settings", SETTINGS.to_json() | {"version": 99})
     with pytest.raises(InputError, match="newer version of surehold"):

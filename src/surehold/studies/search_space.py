@@ -174,18 +174,22 @@ class SearchSpace:
         Raises
         ------
         InputError
-            If its names are not those of the numbers, or choices meet noise that is correlated between variables.
+            If its names are not those of the numbers, or choices meet noise that is correlated or varies.
         """
         if noise is None or self.box is None or not self._choices:
             return noise
         numbers = self.numbers
         if numbers is None:
             raise InputError("input noise is given, but all parameters are choices, which carry none; leave it out.")
+        if noise.varies:
+            raise InputError("input noise varies from place to place, and some parameters are choices; give constants.")
         covariance = noise.unit_covariance(numbers)
         if np.any(covariance != np.diag(np.diag(covariance))):
             raise InputError("input noise is correlated, and some parameters are choices; give standard deviations.")
         deviations = dict.fromkeys(self.box.names, 0.0)
         deviations |= dict(zip(numbers.names, (np.sqrt(np.diag(covariance)) * numbers.widths).tolist(), strict=True))
+        if noise.bounded:
+            return InputNoise.uniform({name: 3.0**0.5 * deviation for name, deviation in deviations.items()})
         return InputNoise(deviations)
 
     def to_json(self) -> dict[str, Any]:

@@ -37,6 +37,7 @@ class StudySettings:
     """what a worker tries, as plain data; empty where a robot makes the trials"""
 
     def __post_init__(self) -> None:
+        _noise_to_json(self.input_noise, self.space)
         for name in self.units:
             if name not in self.space.distributions:
                 raise InputError(
@@ -116,18 +117,23 @@ def _short(value: Any) -> str:
 
 
 def _noise_to_json(noise: InputNoise | None, space: SearchSpace) -> dict[str, Any] | None:
-    """Return standard deviations by name, or a covariance in the order of the numbers, in the parameters' units."""
+    """Return standard deviations or half-widths by name, or a covariance in the order of the numbers."""
     numbers = space.numbers
     if noise is None or numbers is None:
         return None
-    if noise.bounded or noise.varies:
+    if noise.varies:
         raise InputError(
-            f"a study stores Gaussian noise that is the same everywhere, not {noise!r}; give its covariance."
+            "input noise that differs from place to place is a function, which cannot be stored with a study; give "
+            "standard deviations, half-widths or a covariance, or use surehold.Sampler directly."
         )
     covariance = noise.unit_covariance(numbers)
     deviations = np.sqrt(np.diag(covariance)) * numbers.widths
     if np.array_equal(covariance, np.diag(np.diag(covariance))):
         rounded = [float(f"{deviation:.14g}") for deviation in deviations]  # 0.003, not 0.0029999999999999996
+        if noise.bounded:
+            return {
+                "half_widths": {n: float(f"{3.0**0.5 * r:.13g}") for n, r in zip(numbers.names, rounded, strict=True)}
+            }
         return {"standard_deviations": dict(zip(numbers.names, rounded, strict=True))}
     return {"covariance": (covariance * np.outer(numbers.widths, numbers.widths)).tolist()}
 
@@ -137,4 +143,6 @@ def _noise_from_json(data: Mapping[str, Any] | None) -> InputNoise | None:
         return None
     if "covariance" in data:
         return InputNoise(covariance=data["covariance"])
+    if "half_widths" in data:
+        return InputNoise.uniform(data["half_widths"])
     return InputNoise(data["standard_deviations"])
