@@ -1,0 +1,122 @@
+"""What grasps are worth when the hand strays: `python -m benchmarks.robust_grasps --rows grasps.jsonl --seeds 10`.
+
+Mug and bottle, in the two position offsets (100 trials, 40 of them initial) and in all seven variables (150 trials, 30
+of them initial), with input noise of 3 % of the box in every variable. Trials reach what is commanded. Plain
+optimization answers with its highest observed trial, the others with their recommendation; every answer is queried
+1,000 times more, the same perturbations for all of them, and none of these is part of the budget. Every finished run is
+a line of the rows' file: a benchmark that is stopped goes on where it was (give another file for another program).
+
+Printed are means over seeds with standard errors: of the re-queries' mean, lowest value, standard deviation and the
+mean of their worst tenth; the difference of the means from "robust", paired on common seeds; and CPU seconds a run.
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+import surehold as sh
+from surehold.campaigns.single_run import versions
+
+NOISE = sh.InputNoise.unit(0.03)
+SEVEN = ("dx", "dy", "dz", "rx", "ry", "rz", "s1")
+PROBLEMS = {
+    "mug 2-D": ("mug", ("dx", "dy"), 100, 40),
+    "bottle 2-D": ("bottle", ("dx", "dy"), 100, 40),
+    "mug 7-D": ("mug", SEVEN, 150, 30),
+    "bottle 7-D": ("bottle", SEVEN, 150, 30),
+}
+METHODS = {
+    "robust": {"input_noise": NOISE},
+    "BO": {},
+    "UEI, thesis": {"input_noise": NOISE, "criterion": "uei", "preset": "thesis-grasp"},
+    "UEI": {"input_noise": NOISE, "criterion": "uei"},
+    "cvar": {"input_noise": NOISE, "risk": "cvar"},
+}
+REQUERIES = 1000
+TAIL = 0.1
+SCORES = ("mean", "worst", "std", "tenth")
+
+
+def run(problem, n_trials, n_initial, seed, settings):
+    """Return the row of one run: the answer (d,) and what its re-queries gave."""
+    started = time.process_time()
+    optimizer = sh.Optimizer(problem.box, n_initial=n_initial, seed=seed, **settings)
+    for _ in range(n_trials):
+        x = optimizer.ask()
+        optimizer.tell(x, problem(x))
+    x = optimizer.recommend().x if settings else optimizer.X[int(np.argmax(optimizer.y))]
+    seconds = time.process_time() - started
+    score = sh.problems.robust_score(problem, x, NOISE, n=REQUERIES, seed=12345)
+    if score.n_failed:
+        raise RuntimeError(f"{score.n_failed} re-queries of {x.tolist()} failed")
+    return {
+        "x": x.tolist(),
+        "observed": float(optimizer.y.max()),
+        "mean": score.mean,
+        "worst": score.worst,
+        "std": score.std,
+        "tenth": float(np.sort(score.values)[: round(TAIL * REQUERIES)].mean()),
+        "cpu": seconds,
+    }
+
+
+def finished(path):
+    """Return the rows of a file by (problem, method, seed)."""
+    lines = path.read_text().splitlines() if path.exists() else []
+    rows = [json.loads(line) for line in lines]
+    return {(row["problem"], row["method"], row["seed"]): row for row in rows}
+
+
+def summary(values):
+    error = np.std(values, ddof=1) / np.sqrt(len(values)) if len(values) > 1 else np.nan
+    return f"{np.mean(values):.4f} ({error:.4f})"
+
+
+def report(rows, problems, methods):
+    sources = {row["source"] for row in rows.values()}
+    if len(sources) > 1:
+        print(f"These rows come from {len(sources)} states of the program: {', '.join(sorted(sources))}")
+    head = "".join(f"{name:>17}" for name in ("mean", "worst of 1,000", "std", "worst tenth", "minus robust"))
+    print(f"{'problem':11} {'method':12} seeds {head}  CPU s")
+    for name in problems:
+        for method in methods:
+            own = {seed: row for (p, m, seed), row in rows.items() if (p, m) == (name, method)}
+            if not own:
+                continue
+            pairs = [seed for seed in own if (name, "robust", seed) in rows]
+            gaps = [own[seed]["mean"] - rows[name, "robust", seed]["mean"] for seed in pairs]
+            cells = [summary([row[score] for row in own.values()]) for score in SCORES]
+            cells.append(summary(gaps) if gaps and method != "robust" else "")
+            seconds = np.mean([row["cpu"] for row in own.values()])
+            print(f"{name:11} {method:12} {len(own):5d} {''.join(f'{cell:>17}' for cell in cells)}  {seconds:5.1f}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rows", type=Path, required=True, help="file of finished runs; made or continued")
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--problems", nargs="+", default=list(PROBLEMS), choices=list(PROBLEMS))
+    parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS))
+    arguments = parser.parse_args()
+    rows, source = finished(arguments.rows), versions()["source"]
+    built = {name: sh.problems.Grasp(PROBLEMS[name][0], variables=PROBLEMS[name][1]) for name in arguments.problems}
+    for seed in range(arguments.seeds):
+        for name, problem in built.items():
+            for method in arguments.methods:
+                if (name, method, seed) in rows:
+                    continue
+                with threadpool_limits(1):
+                    made = run(problem, *PROBLEMS[name][2:], seed, METHODS[method])
+                row = {"problem": name, "method": method, "seed": seed, **made, "source": source}
+                rows[name, method, seed] = row
+                with arguments.rows.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+    report(rows, arguments.problems, arguments.methods)
+
+
+if __name__ == "__main__":
+    main()
