@@ -5,6 +5,7 @@ import pytest
 
 from surehold.errors import InputError
 from surehold.grasping.distance_field import MARGIN, cache_folder, distance_field_of
+from surehold.grasping.mesh_distance import FAR_INSIDE, FAR_OUTSIDE
 from surehold.grasping.meshes import OBJECTS, shipped_object
 from surehold.grasping.solids import signed_distance
 
@@ -71,7 +72,10 @@ def test_mesh_without_solids_has_the_same_field(tmp_path, monkeypatch):
     bottle = shipped_object("bottle")
     bare = distance_field_of(dataclasses.replace(bottle, solids=()), 0.006)
     exact = distance_field_of(bottle, 0.006)
-    assert np.abs(bare.nodes[..., 0] - exact.nodes[..., 0]).max() < 2e-5
+    error = bare.nodes[..., 0] - exact.nodes[..., 0]
+    near = (exact.nodes[..., 0] > -FAR_INSIDE) & (exact.nodes[..., 0] < FAR_OUTSIDE)
+    assert np.abs(error[near]).max() < 2e-5
+    assert np.abs(error).max() < 0.25 * 0.006, "beyond, distances may be a bit too large"
 
 
 @pytest.mark.parametrize("cell", [0.0, -1.0, float("nan"), 1e-5])

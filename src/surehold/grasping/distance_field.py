@@ -27,7 +27,14 @@ from surehold.errors import InputError
 from surehold.grasping.meshes import GraspObject
 from surehold.grasping.solids import signed_distance
 
-__all__ = ["DistanceField", "cache_folder", "distance_field_of", "field_distance", "field_distance_gradient"]
+__all__ = [
+    "DistanceField",
+    "cache_folder",
+    "content_hash",
+    "distance_field_of",
+    "field_distance",
+    "field_distance_gradient",
+]
 
 CELL: Final = 0.001  #: edge of a grid cell [m]
 MARGIN: Final = 0.012  #: how far the grid reaches beyond the object: finger radius + soft-touch depth, and slack [m]
@@ -87,7 +94,8 @@ def distance_field_of(
             f"{' x '.join(map(str, shape))} nodes; give a larger cell than {cell * 1e3:g} mm."
         )
     frame = np.concatenate([lower - MARGIN, [cell], lower, upper])
-    path = cache_folder() / "fields" / f"{_content_hash(obj, frame)}.npy"
+    name = content_hash(f"{_FORMAT} {bool(obj.solids)}", np.round(obj.vertices, 9), obj.faces, frame)
+    path = cache_folder() / "fields" / f"{name}.npy"
     nodes = _load(path, (*shape.tolist(), 4))
     if nodes is None:
         nodes = _compute(obj, frame, shape, progress)
@@ -118,10 +126,12 @@ def _mesh_cell(size: NDArray[np.float64], triangles: int) -> float:
     return max(CELL, np.ceil(needed * 1e4) * 1e-4)
 
 
-def _content_hash(obj: GraspObject, frame: NDArray[np.float64]) -> str:
-    content = hashlib.sha256(f"{_FORMAT} {bool(obj.solids)}".encode())
-    for part in (np.round(obj.vertices, 9), obj.faces, frame):
-        content.update(np.ascontiguousarray(part).tobytes())
+def content_hash(text: str, *arrays: NDArray[np.generic]) -> str:
+    """Return a name for the cached results that follow from a text and some arrays."""
+    content = hashlib.sha256(text.encode())
+    for array in arrays:
+        content.update(str(array.shape).encode())
+        content.update(np.ascontiguousarray(array).tobytes())
     return content.hexdigest()[:32]
 
 

@@ -65,6 +65,13 @@ class Hand:
         """Return the name of a body: "palm", or such as "index distal"."""
         return "palm" if body == self.palm else self.link_names[body]
 
+    def arrays(self) -> tuple[Array, ...]:
+        """Return all numbers that make up the hand, its preshapes included; equal arrays, equal grasps."""
+        shapes = [part for preshape in self.preshapes.values() for part in (np.hstack(preshape[:3]), preshape[5])]
+        geometry = (self.bases, self.chains, self.radii, self.lower, self.upper, self.palm_poses)
+        rest = (self.palm_half_extents, self.palm_roundings, self.grasp_center, *map(np.asarray, shapes))
+        return geometry + rest
+
     def reach(self) -> Array:
         """Return (f, j, j): an upper bound of the speed of link k when joint i <= k moves at 1 [m/rad, or 1 in m/m].
 

@@ -4,8 +4,8 @@
 
 Inside and outside are told apart by the fast winding number (Barill et al. 2018), to which small holes do no harm.
 Closest points are exact for nodes up to `FAR_OUTSIDE` outside and `FAR_INSIDE` inside, where contacts happen. For nodes
-beyond, whose closest points take long to find because many are about equally close, the closest point of the nearest
-exact node is taken: a point of the surface, at a distance that is too large by at most about cell^2 / (2 d).
+beyond, whose closest points take long to find because many are about equally close, the best of the closest points of
+exact nodes nearby is taken: a point of the surface, at a distance that is too large by up to a quarter of a cell.
 """
 
 from collections.abc import Callable
@@ -22,6 +22,7 @@ __all__ = ["mesh_distance"]
 FAR_OUTSIDE: Final = 0.012  #: a finger's radius and the depth of a soft touch, and slack [m]
 FAR_INSIDE: Final = 0.004  #: skin and soft touch, and slack [m]
 _CHUNK = 20_000
+_ROUNDS = 3  # of offers between neighbors
 
 
 def mesh_distance(
@@ -68,6 +69,7 @@ def mesh_distance(
         )
         nearest = np.ravel_multi_index(tuple(indices.reshape(3, -1)), tuple(shape.tolist()))
         closest[unknown] = closest[nearest[unknown]]
+        _improve(closest, points, np.flatnonzero(unknown), shape)
     away = points - closest
     length = np.linalg.norm(away, axis=1)
     sign = np.where(inside, -1.0, 1.0)
@@ -75,6 +77,24 @@ def mesh_distance(
     nodes[:, 0] = sign * length
     nodes[:, 1:] = away * (sign / np.where(length > 0.0, length, 1.0))[:, None]
     return nodes
+
+
+def _improve(
+    closest: NDArray[np.float64], points: NDArray[np.float64], unknown: NDArray[np.int_], shape: NDArray[np.int_]
+) -> None:
+    """Let nodes `unknown` take over the closest point of a neighbor, where that is closer."""
+    place = np.stack(np.unravel_index(unknown, tuple(shape.tolist())))
+    squared = np.sum((points[unknown] - closest[unknown]) ** 2, axis=1)
+    strides = (int(shape[1] * shape[2]), int(shape[2]), 1)
+    for _ in range(_ROUNDS):
+        for axis in range(3):
+            for step in (-1, 1):
+                valid = np.flatnonzero((place[axis] + step >= 0) & (place[axis] + step < shape[axis]))
+                offered = closest[unknown[valid] + step * strides[axis]]
+                found = np.sum((points[unknown[valid]] - offered) ** 2, axis=1)
+                better = found < squared[valid]
+                squared[valid[better]] = found[better]
+                closest[unknown[valid[better]]] = offered[better]
 
 
 def _sampled(obj: GraspObject, first: NDArray[np.float64], shape: NDArray[np.int_], cell: float) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ Bounds (after the published grasp experiments): dx within ±(b + 25 mm), dy with
 from the box center within h/3 and h/3 + 40 mm (1 + h / 50 mm), turns within ±45 degrees, s1 where it moves the thumb.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.grasp import THESIS, Simulator
 from surehold.grasping.grasp import Grasp as GraspOutcome
+from surehold.grasping.hand import Hand
 from surehold.grasping.meshes import GraspObject, shipped_object
 from surehold.grasping.poses import Pose, default_pose, facet_axes
 from surehold.grasping.synergy import preshape_of
@@ -52,7 +53,7 @@ class Grasp:
         facet against which the thumb comes to press, such as "right-front".
     variables
         Names of the free variables, a subset of `VARIABLES`; their order is the order of the coordinates.
-    contact, quality, closing, friction, torsion, cones, task, collision, hand
+    contact, quality, closing, friction, torsion, cones, task, collision, hand, preshape
         As in `surehold.grasping.Simulator`.
     preset
         "thesis": single contacts, the quality "simox", closing "synergy", polyhedral cones, collisions worth 0, and s1
@@ -62,6 +63,8 @@ class Grasp:
     fixed
         `{name: value}` in m and rad for variables that are not free and shall not have their default: 0 for the
         offsets, and for s1 what `default` says.
+    progress
+        Called with the share that is done while the default pose of a mesh or of another hand is searched.
 
     Attributes
     ----------
@@ -91,9 +94,11 @@ class Grasp:
         task: ArrayLike | None = None,
         collision: str = "penalty",
         preset: str = "",
-        hand: str = "icub-left",
+        hand: str | Hand = "icub-left",
+        preshape: str | None = None,
         bounds: Mapping[str, tuple[float, float]] | None = None,
         fixed: Mapping[str, float] | None = None,
+        progress: Callable[[float], None] = lambda share: None,
     ):
         names = (variables,) if isinstance(variables, str) else tuple(variables)
         for name in [*names, *(bounds or {}), *(fixed or {})]:
@@ -124,6 +129,7 @@ class Grasp:
             "task": task,
             "collision": collision,
             "hand": hand,
+            "preshape": preshape,
         }
         if preset not in ("", "thesis"):
             raise unknown_name("preset", preset, ["thesis"])
@@ -133,8 +139,13 @@ class Grasp:
         self._simulator = self._build()
         chosen = preshape_of(self._simulator.hand, self._simulator.preshape)
         self._s1_range = chosen.s1_range if preset else chosen.s1_useful
-        self.default: Final[GraspDefault] = grasp_default(self.simulator, facet)
+        self.default: Final[GraspDefault] = grasp_default(self.simulator, facet, progress)
         self._fixed: dict[str, float] = dict.fromkeys(VARIABLES, 0.0) | {"s1": self.default.s1} | dict(fixed or {})
+        if "s1" in names and "s1" not in (bounds or {}) and self._s1_range[0] >= self._s1_range[1]:
+            raise InputError(
+                f"the preshape '{self._simulator.preshape}' of hand '{self._simulator.hand.name}' has no posture variable; "
+                "take s1 out of the variables."
+            )
         limits = self._limits(np.abs(axes.T) @ body.box_half_extents) | dict(bounds or {})
         self.box: Final[Box] = Box({name: limits[name] for name in names})
         self.units: Final[tuple[str, ...]] = tuple(VARIABLES[name] for name in names)

@@ -4,15 +4,23 @@ For each object and mode the search tries standoffs s from h/3 to h + 20 mm (h t
 towards the hand) and thumb postures s1, and for each of them a grid of 15 x 7 offsets (dx, dy) over the bounds of
 `surehold.problems.Grasp`, with graded contacts. Of the pairs that leave a third to two thirds of these poses free of
 collision it takes the one with the highest mean quality; without such a pair, of those nearest to that range.
+The table holds what was found for the shipped objects, the left iCub hand and its power grasp; what is found for other
+hands and for meshes is kept in the cache folder.
 `python -m surehold.problems.grasp_defaults` repeats the search for the shipped objects and prints the table below.
 """
 
+import json
+import os
 import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.grasping.distance_field import cache_folder, content_hash
 from surehold.grasping.grasp import Simulator
 from surehold.grasping.meshes import OBJECTS
 from surehold.grasping.poses import MODES, Pose, default_pose, facet_axes
@@ -28,6 +36,7 @@ class GraspDefault(NamedTuple):
     s1: float  #: posture variable [rad]
 
 
+_FORMAT: Final = 1  # part of the name of cached results: a change of the search must not find old ones
 _FREE_SHARE: Final = (1.0 / 3.0, 2.0 / 3.0)  # of the coarse grid: 30 to 70 % of all poses, with a margin
 
 #: (object, mode) -> standoff [mm], s1 [rad]; printed by this module
@@ -131,20 +140,47 @@ _TABLE: Final[dict[tuple[str, str], tuple[float, float]]] = {
 }
 
 
-def grasp_default(simulator: Simulator, mode: str) -> GraspDefault:
-    """Return the default of a mode: from the table for a shipped object, else by the search (some seconds)."""
-    known = _TABLE.get((simulator.object.name, mode)) if simulator.object.solids else None
+def grasp_default(
+    simulator: Simulator, mode: str, progress: Callable[[float], None] = lambda share: None
+) -> GraspDefault:
+    """Return the default of a mode: from the table for a shipped object, else by the search (some seconds).
+
+    What was searched is kept in the cache folder. `progress` is called with the share of a search that is done.
+    """
+    hand, obj = simulator.hand, simulator.object
+    if obj.solids and hand.name == "icub-left" and simulator.preshape == "power":
+        standoff, s1 = _TABLE[(obj.name, mode)]
+        return GraspDefault(standoff * 1e-3, s1)
+    numbers = (np.round(obj.vertices, 9), obj.faces, obj.axes, np.array([obj.friction]), *hand.arrays())
+    path = cache_folder() / "defaults" / f"{content_hash(f'{_FORMAT} {simulator.preshape} {mode}', *numbers)}.json"
+    known = _load(path)
     if known is None:
-        return search_default(simulator, mode)
-    return GraspDefault(known[0] * 1e-3, known[1])
+        known = search_default(Simulator(hand, obj, preshape=simulator.preshape), mode, progress)
+        with suppress(OSError):  # a folder that cannot be written costs time at the next start and nothing else
+            path.parent.mkdir(parents=True, exist_ok=True)
+            scratch = path.with_suffix(f".{os.getpid()}.tmp")
+            scratch.write_text(json.dumps(known))
+            scratch.replace(path)
+    return known
 
 
-def search_default(simulator: Simulator, mode: str) -> GraspDefault:
+def _load(path: Path) -> GraspDefault | None:
+    try:
+        standoff, s1 = json.loads(path.read_text())
+        return GraspDefault(float(standoff), float(s1))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def search_default(
+    simulator: Simulator, mode: str, progress: Callable[[float], None] = lambda share: None
+) -> GraspDefault:
     """Search standoff and s1 of a mode as the module says."""
     along, across, depth = np.abs(facet_axes(mode).T) @ simulator.object.box_half_extents
     offsets = [(dx, dy) for dx in (along + 0.025) * _middles(15) for dy in across * _middles(7)]
     candidates: list[tuple[float, GraspDefault, list[Pose]]] = []
-    for standoff in np.round(np.linspace(depth / 3.0, depth + 0.020, 10), 4).tolist():
+    standoffs = np.round(np.linspace(depth / 3.0, depth + 0.020, 10), 4).tolist()
+    for step, standoff in enumerate(standoffs):
         poses = [
             default_pose(simulator.hand, simulator.object, mode, standoff, (*offset, 0, 0, 0, 0)) for offset in offsets
         ]
@@ -154,9 +190,13 @@ def search_default(simulator: Simulator, mode: str) -> GraspDefault:
             share = len(free) / len(poses)
             outside = max(_FREE_SHARE[0] - share, share - _FREE_SHARE[1], 0.0)
             candidates.append((outside, GraspDefault(standoff, s1), free))
+        progress(0.5 * (step + 1) / len(standoffs))
     nearest = min(outside for outside, _, _ in candidates)
     eligible = [(default, free) for outside, default, free in candidates if outside == nearest]
-    totals = [sum(simulator.grasp(pose, default.s1).quality for pose in free) for default, free in eligible]
+    totals = []
+    for step, (default, free) in enumerate(eligible):
+        totals.append(sum(simulator.grasp(pose, default.s1).quality for pose in free))
+        progress(0.5 + 0.5 * (step + 1) / len(eligible))
     return eligible[int(np.argmax(totals))][0]
 
 
