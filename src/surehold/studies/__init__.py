@@ -12,8 +12,15 @@ if TYPE_CHECKING:
     from surehold.studies.settings import StudySettings
     from surehold.studies.stop_rule import StopRule
 
+from surehold.errors import InputError
+
+
+class _OptunaMissing(InputError, ImportError):
+    pass
+
+
 if find_spec("optuna") is None:
-    raise ModuleNotFoundError("surehold.studies stands on Optuna; install it with: pip install 'surehold[study]'")
+    raise _OptunaMissing("studies stand on Optuna, which is not installed; pip install 'surehold[study]' does it.")
 
 __all__ = [
     "Asked",
