@@ -1,6 +1,8 @@
 import json
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -124,6 +126,23 @@ def test_a_worker_by_command(study, capsys):
     study("create r --problem rkhs --initial 3")
     assert run(["study", "work", "r", "--trials", "3"]) == 0
     assert "Done: 3 trials" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
+def test_a_worker_that_is_ended_lets_its_trial_go(ending, study, here):
+    (here / "slow.py").write_text("import time\n\ndef f(x):\n    time.sleep(60.0)\n")
+    study("create slow --parameters x=0:1 --problem slow.py:f --noise none")
+    command = [sys.executable, "-m", "surehold", "study", "work", "slow"]
+    worker = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while study("status slow")["running"] == 0:
+        assert worker.poll() is None
+        time.sleep(0.1)
+    time.sleep(0.3)
+    worker.send_signal(ending)
+    out, err = worker.communicate(timeout=60)
+    assert (worker.returncode, err) == (130, "")
+    assert "the one under way is let go" in out
+    assert study("status slow")["pending"][0]["worker_alive"] is False
 
 
 def test_warm_start_from_a_file_and_from_a_study(study, here):

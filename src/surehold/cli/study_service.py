@@ -56,7 +56,7 @@ def work(
             work_on(study, attempt, lifetime=lifetime, most=trials, after=show)
         except KeyboardInterrupt:
             console.print(f"Ended after {count} trials; the one under way is let go.", markup=False)
-            raise typer.Exit(130) from None
+            raise SystemExit(130) from None  # typer.Exit(130) reads as an interruption with nothing to keep
     console.print(f"Done: {count} trials by this worker.", markup=False)
 
 
