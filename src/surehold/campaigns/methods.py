@@ -15,7 +15,8 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.gaussian_process import GaussianProcess
 from surehold.optimization.input_noise import InputNoise
-from surehold.optimization.optimizer import SURROGATES, Optimizer
+from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.surrogates import SURROGATES
 from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
 from surehold.optimization.risk import Risk
 

@@ -1,5 +1,6 @@
 """How far the reached input strays from the commanded one: its distribution over the variables of a box."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -145,6 +146,18 @@ class InputNoise:
         shape = (n, box.dimension)
         standard = rng.uniform(-(3.0**0.5), 3.0**0.5, shape) if self.bounded else rng.standard_normal(shape)
         return standard @ root.T
+
+    def warn_if_larger_than(self, box: Box) -> None:
+        """Warn of variables whose standard deviation is more than half of the box."""
+        deviation = np.sqrt(np.diag(self.unit_covariance(box)))
+        for name, width, share in zip(box.names, box.widths, deviation, strict=True):
+            if share > 0.5:
+                warnings.warn(
+                    f"input noise of {name} has a standard deviation of {share * width:.3g}, {share:.1f} times the "
+                    "box: wherever it is commanded, the reached input may be anywhere in the box and beyond, so that hardly "
+                    "any place is safer than another. Check its unit, or give a wider box.",
+                    stacklevel=3,
+                )
 
     def _at(self, x: NDArray[np.float64], box: Box) -> "InputNoise":
         """Return the noise that the user's function states at x (d,), checked."""

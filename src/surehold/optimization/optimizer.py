@@ -5,7 +5,6 @@ Legend
     t   trials told, failed ones included
 """
 
-import warnings
 from typing import Final, Literal, cast
 
 import numpy as np
@@ -15,29 +14,27 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition import criterion_name
 from surehold.optimization.box import Box
 from surehold.optimization.designs import design as initial_design
-from surehold.optimization.gaussian_process import GaussianProcess, NoiseName
+from surehold.optimization.gaussian_process import NoiseName
 from surehold.optimization.goal import Goal
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.lattice import Lattice, LatticePosterior
-from surehold.optimization.local_global import LocalGlobalProcess
 from surehold.optimization.noisy_inputs import (
     NoisySurrogate,
     condition_on_noisy_inputs,
     noise_from_reached,
     noise_from_repeats,
 )
-from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
+from surehold.optimization.presets import thesis_preset
 from surehold.optimization.quadratures import exact
 from surehold.optimization.recommendation import Recommendation, recommendation
 from surehold.optimization.risk import Risk
 from surehold.optimization.robustness import Perturbations
 from surehold.optimization.surrogate import Posterior, Surrogate, mixture
+from surehold.optimization.surrogates import surrogate_named
 from surehold.optimization.threads import single_threaded
 from surehold.optimization.trials import Trials, same
 
 __all__ = ["Optimizer"]
-
-SURROGATES: Final = ("gp", "tgp", "local_global")
 
 
 class Optimizer:
@@ -136,25 +133,11 @@ class Optimizer:
         self.seed: Final = _count("seed", seed, 0)
         self.n_initial: Final = _count("n_initial", self.default_n_initial(box) if n_initial is None else n_initial, 1)
         thesis = None if preset is None else thesis_preset(preset)
-        if not isinstance(surrogate, str):
-            self._surrogate: Surrogate = surrogate
-        elif surrogate not in SURROGATES:
-            raise unknown_name("surrogate", surrogate, SURROGATES)
-        else:
-            default = GaussianProcess(noise=noise, output_range=output_range)
-            process = default if thesis is None else thesis.gaussian_process()
-            tree = TREED if thesis is None else TreedSettings(thesis.min_leaf, continued=True)
-            if surrogate == "gp":
-                self._surrogate = process
-            elif surrogate == "tgp":
-                self._surrogate = tree.surrogate(process, box, input_noise, self.seed)
-            else:
-                self._surrogate = LocalGlobalProcess(output_range)
-                if preset is not None or noise not in ("none", 0.0):
-                    raise InputError(
-                        "surrogate 'local_global' has no preset and takes exact observations; "
-                        "leave preset= and noise= out, or choose 'gp' or 'tgp'."
-                    )
+        self._surrogate: Surrogate = (
+            surrogate_named(surrogate, box, input_noise, self.seed, noise, output_range, thesis)
+            if isinstance(surrogate, str)
+            else surrogate
+        )
         if criterion is None:
             criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + (input_noise is not None)]
         name = criterion_name(criterion)
@@ -164,7 +147,7 @@ class Optimizer:
         if input_noise is None and (name.scale != "exact" or risk.name != "mean"):
             raise InputError(f"criterion '{criterion}' and risk '{risk.name}' need input noise; give input_noise=.")
         if input_noise is not None:
-            _warn_if_huge(input_noise, box)
+            input_noise.warn_if_larger_than(box)
         many = name.scale == "robust" or risk.name != "mean"
         rule = quadrature or ("quasi_monte_carlo" if many else "unscented")
         self._goal = Goal(
@@ -420,18 +403,6 @@ class Optimizer:
 
     def _rng(self, purpose: int, position: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, purpose, position])
-
-
-def _warn_if_huge(noise: InputNoise, box: Box) -> None:
-    deviation = np.sqrt(np.diag(noise.unit_covariance(box)))
-    for name, width, share in zip(box.names, box.widths, deviation, strict=True):
-        if share > 0.5:
-            warnings.warn(
-                f"input noise of {name} has a standard deviation of {share * width:.3g}, {share:.1f} times the box: "
-                "wherever it is commanded, the reached input may be anywhere in the box and beyond, so that hardly any "
-                "place is safer than another. Check its unit, or give a wider box.",
-                stacklevel=3,
-            )
 
 
 def _count(name: str, value: int, least: int) -> int:
