@@ -16,9 +16,9 @@ from surehold.optimization.box import Box
 from surehold.optimization.gaussian_process import GaussianProcess
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.surrogates import SURROGATES
 from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
 from surehold.optimization.risk import Risk
+from surehold.optimization.surrogates import SURROGATES
 
 __all__ = ["METHODS", "Method", "build_method", "checked_method", "checked_settings"]
 

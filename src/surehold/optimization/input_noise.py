@@ -154,8 +154,8 @@ class InputNoise:
             if share > 0.5:
                 warnings.warn(
                     f"input noise of {name} has a standard deviation of {share * width:.3g}, {share:.1f} times the "
-                    "box: wherever it is commanded, the reached input may be anywhere in the box and beyond, so that hardly "
-                    "any place is safer than another. Check its unit, or give a wider box.",
+                    "box: wherever it is commanded, the reached input may be anywhere in the box and beyond, so that "
+                    "hardly any place is safer than another. Check its unit, or give a wider box.",
                     stacklevel=3,
                 )
 
