@@ -143,8 +143,8 @@ class Grasp:
         self._fixed: dict[str, float] = dict.fromkeys(VARIABLES, 0.0) | {"s1": self.default.s1} | dict(fixed or {})
         if "s1" in names and "s1" not in (bounds or {}) and self._s1_range[0] >= self._s1_range[1]:
             raise InputError(
-                f"the preshape '{self._simulator.preshape}' of hand '{self._simulator.hand.name}' has no posture variable; "
-                "take s1 out of the variables."
+                f"the preshape '{self._simulator.preshape}' of hand '{self._simulator.hand.name}' has no posture "
+                "variable; take s1 out of the variables."
             )
         limits = self._limits(np.abs(axes.T) @ body.box_half_extents) | dict(bounds or {})
         self.box: Final[Box] = Box({name: limits[name] for name in names})

@@ -138,10 +138,11 @@ def report_of(
 
 def grasp_scene(scene: "GraspScene") -> Scene:
     """Return a grasp's scene as the page draws it: the object see-through, the links that touch in another color."""
-    object_mesh = SceneMesh("object", scene.object.vertices, scene.object.faces, _OBJECT, see_through=True)
+    thing = scene.object
+    object_mesh = SceneMesh("object", thing.vertices, thing.faces, _OBJECT, see_through=True, poses=thing.poses)
     touching = set(scene.bodies)
     hand = [
-        SceneMesh(mesh.name, mesh.vertices, mesh.faces, _TOUCHING if mesh.name in touching else _HAND)
+        SceneMesh(mesh.name, mesh.vertices, mesh.faces, _TOUCHING if mesh.name in touching else _HAND, poses=mesh.poses)
         for mesh in scene.hand
     ]
     friction = np.full(len(scene.points), float(scene.friction))

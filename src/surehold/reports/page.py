@@ -89,6 +89,13 @@ def scene_context(
     return {
         "scene": None if scene is None else Markup(_json_for_html(scene)),
         "scene_labels": list(labels) or [{"role": "answer", "mark": "", "text": c.label} for c in shown],
+        "scene_moves": any(
+            mesh.poses is not None and len(mesh.poses) > 1
+            for c in shown
+            if c.scene is not None
+            for mesh in c.scene.meshes
+        ),
+        "scene_has_neighbors": any(c.scene is not None and c.scene.neighbors is not None for c in shown),
         "scene_has_box": any(c.scene is not None and c.scene.box is not None for c in shown),
         "three": Markup("" if scene is None else _vendored("three.bundle.min.js")),
         "scene_script": Markup((TEMPLATES / "scene.js").read_text(encoding="utf-8")),

@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError
 
-__all__ = ["Candidate", "ContactSet", "ObjectBox", "RunReport", "Scene", "SceneMesh", "Surface", "Variable"]
+__all__ = [
+    "Candidate",
+    "ContactSet",
+    "Neighbors",
+    "ObjectBox",
+    "RunReport",
+    "Scene",
+    "SceneMesh",
+    "Surface",
+    "Variable",
+]
 
 Floats = NDArray[np.floating]
 
@@ -47,10 +57,11 @@ class SceneMesh:
     """A triangle mesh of a scene; equal meshes of two scenes are stored once."""
 
     name: str
-    vertices: Floats  #: (v, 3) [m]
+    vertices: Floats  #: (v, 3) [m], in the frame that `poses` places
     faces: NDArray[np.integer]  #: (f, 3) indices into the vertices
     color: str = "#8a93a3"  #: CSS hexadecimal
     see_through: bool = False  #: drawn half transparent on request, so that contacts inside are seen
+    poses: Floats | None = None  #: (k, 3, 4) rotation and origin while the hand closes; None for one that rests at 0
 
 
 @dataclass(frozen=True)
@@ -61,6 +72,14 @@ class ContactSet:
     normals: Floats  #: (c, 3) unit vectors into the object
     friction: Floats  #: (c,) friction coefficients
     weights: Floats  #: (c,) share of a full contact, 0 to 1
+
+
+@dataclass(frozen=True)
+class Neighbors:
+    """Where else the hand may end up within the input noise, and what became of it there."""
+
+    points: Floats  #: (n, 3) places of the hand's grasp center [m]
+    unsafe: NDArray[np.bool_]  #: (n,) the grasp there is bad
 
 
 @dataclass(frozen=True)
@@ -79,6 +98,7 @@ class Scene:
     meshes: tuple[SceneMesh, ...]
     contacts: ContactSet | None = None
     box: ObjectBox | None = None
+    neighbors: Neighbors | None = None
     view: tuple[float, float, float] = (0.5, -0.8, 1.0)  #: direction from the object to the eye
 
 

@@ -34,7 +34,7 @@ def scene_data(candidates: tuple[Candidate, ...]) -> dict[str, Any] | None:
     known: dict[tuple[Any, ...], int] = {}
     views = []
     for label, scene in shown:
-        indices = []
+        indices, poses = [], []
         for mesh in scene.meshes:
             vertices = _buffer(buffers, _finite(mesh.vertices, 3, mesh.name).astype("<f4"))
             faces = _buffer(buffers, _faces(mesh).astype("<u4"))
@@ -43,7 +43,8 @@ def scene_data(candidates: tuple[Candidate, ...]) -> dict[str, Any] | None:
                 known[key] = len(meshes)
                 meshes.append(dict(zip(("name", "color", "see_through", "vertices", "faces"), key, strict=True)))
             indices.append(known[key])
-        views.append({"label": label, "meshes": indices, **_marks(scene), "view": list(scene.view)})
+            poses.append(None if mesh.poses is None else _buffer(buffers, _poses(mesh).astype("<f4")))
+        views.append({"label": label, "meshes": indices, "poses": poses, **_marks(scene), "view": list(scene.view)})
     triangles = sum(len(buffers[m["faces"]]) // 16 for m in meshes)
     if triangles > _MOST_TRIANGLES:
         raise InputError(
@@ -73,7 +74,20 @@ def _marks(scene: Scene) -> dict[str, Any]:
             "size": _round(scene.box.size),
             "axes": [_round(axis) for axis in np.asarray(scene.box.rotation).T],
         }
+    marks["neighbors"] = []
+    if scene.neighbors is not None:
+        points = _finite(scene.neighbors.points, 3, "neighbors")
+        marks["neighbors"] = [
+            {"p": _round(p), "bad": bool(bad)} for p, bad in zip(points, scene.neighbors.unsafe, strict=True)
+        ]
     return marks
+
+
+def _poses(mesh: SceneMesh) -> NDArray[np.floating]:
+    poses = np.asarray(mesh.poses)
+    if poses.ndim != 3 or poses.shape[1:] != (3, 4) or not len(poses) or not np.all(np.isfinite(poses)):
+        raise InputError(f"poses of mesh '{mesh.name}' must be finite, of shape (k, 3, 4); got shape {poses.shape}.")
+    return poses
 
 
 def _round(vector: NDArray[np.floating]) -> list[float]:

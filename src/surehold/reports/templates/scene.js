@@ -67,19 +67,35 @@
     const material = new THREE.MeshStandardMaterial({ color: mesh.color, roughness: 0.65, metalness: 0, side: THREE.DoubleSide });
     const solid = new THREE.Mesh(geometry, material);
     solid.visible = false;
+    solid.matrixAutoUpdate = false;
     scene.add(solid);
     if (mesh.see_through) {
       // Depth first, color after: of a half transparent solid only its nearest surface is blended.
       const depth = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ colorWrite: false, transparent: true }));
       depth.renderOrder = 2;
+      depth.matrixAutoUpdate = false;
       solid.userData.depth = depth;
       scene.add(depth);
     }
     return solid;
   });
 
+  // Poses of the meshes of a view, each (k, 3, 4): share 0 is the open hand, share 1 the grasp.
+  data.views.forEach((view) => { view.motion = view.poses.map((key) => key && new Float32Array(bytes(key))); });
+  const place = (view, share) => view.meshes.forEach((i, n) => {
+    const poses = view.motion[n], solid = solids[i];
+    if (!poses) return;
+    const at = 12 * Math.round(share * (poses.length / 12 - 1));
+    solid.matrix.set(...poses.subarray(at, at + 12), 0, 0, 0, 1);
+    solid.updateMatrixWorld(true);
+    if (solid.userData.depth) { solid.userData.depth.matrix.copy(solid.matrix); solid.userData.depth.updateMatrixWorld(true); }
+  });
+
   const span = new THREE.Box3();
-  data.views.forEach((view) => view.meshes.forEach((i) => span.expandByObject(solids[i])));
+  data.views.forEach((view) => [0, 1].forEach((share) => {
+    place(view, share);
+    view.meshes.forEach((i) => span.expandByObject(solids[i]));
+  }));
   const middle = span.getCenter(new THREE.Vector3());
   const radius = span.getSize(new THREE.Vector3()).length() / 2 || 1;
 
@@ -114,8 +130,17 @@
       frame.position.set(...view.box.center);
       box.add(frame);
     }
-    scene.add(cones, dots, box);
-    return { cones, dots, box };
+    const neighbors = new THREE.Group();
+    view.neighbors.forEach((neighbor) => {
+      // Drawn over everything: these places are mostly inside the object.
+      const dot = new THREE.Mesh(new THREE.SphereGeometry((neighbor.bad ? 0.014 : 0.009) * radius, 12, 8),
+        new THREE.MeshBasicMaterial({ color: neighbor.bad ? "#d4380d" : "#2f9e6e", depthTest: false, transparent: true, opacity: 0.85 }));
+      dot.position.set(...neighbor.p);
+      dot.renderOrder = neighbor.bad ? 6 : 5;
+      neighbors.add(dot);
+    });
+    scene.add(cones, dots, box, neighbors);
+    return { cones, dots, box, neighbors };
   });
 
   let current = data.views.length - 1;
@@ -125,11 +150,14 @@
     renderer.render(scene, camera);
   };
   const shown = (what) => { const input = document.querySelector(`[data-show="${what}"]`); return !input || input.checked; };
-  const boxShown = () => { const input = document.querySelector('[data-show="box"]'); return Boolean(input && input.checked); };
+  const asked = (what) => { const input = document.querySelector(`[data-show="${what}"]`); return Boolean(input && input.checked); };
+  const slider = document.getElementById("closing");
 
   const update = () => {
     scene.background = new THREE.Color(color("--scene"));
     const view = data.views[current];
+    const closed = slider ? Number(slider.value) : 1;
+    place(view, closed);
     solids.forEach((solid, i) => {
       solid.visible = view.meshes.includes(i);
       const glass = data.meshes[i].see_through && shown("glass");
@@ -141,9 +169,10 @@
       if (solid.userData.depth) solid.userData.depth.visible = glass && solid.visible;
     });
     marks.forEach((mark, i) => {
-      mark.dots.visible = i === current;
-      mark.cones.visible = i === current && shown("cones");
-      mark.box.visible = i === current && boxShown();
+      mark.dots.visible = i === current && closed === 1;
+      mark.cones.visible = i === current && closed === 1 && shown("cones");
+      mark.box.visible = i === current && asked("box");
+      mark.neighbors.visible = i === current && asked("neighbors");
     });
     document.querySelectorAll("[data-view]").forEach((button) =>
       button.setAttribute("aria-pressed", String(Number(button.dataset.view) === current)));
@@ -182,6 +211,9 @@
     update();
   }));
   document.querySelectorAll("[data-show]").forEach((input) => input.addEventListener("change", update));
+  if (slider) slider.addEventListener("input", update);
+  const chooser = document.getElementById("scene-chooser");
+  if (chooser) chooser.addEventListener("change", () => { current = Number(chooser.value); update(); });
   document.getElementById("reset").addEventListener("click", reset);
   renderer.domElement.addEventListener("keydown", (event) => {
     const turn = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
