@@ -125,7 +125,7 @@ def test_scene_holds_watertight_bodies_in_the_world(simulator):
     ("options", "words"),
     [
         ({"obj": "mugg"}, "did you mean 'mug'"),
-        ({"hand": "shadow"}, "hand 'shadow' is unknown"),
+        ({"hand": "barrett"}, "hand 'barrett' is unknown"),
         ({"contact": "soft"}, "graded, patch, single"),
         ({"quality": "epsilom"}, "did you mean 'epsilon'"),
         ({"closing": "fast"}, "adaptive, synergy"),

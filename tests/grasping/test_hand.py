@@ -105,7 +105,7 @@ def test_names():
     assert (hand.palm, hand.body_name(20), hand.body_name(0)) == (20, "palm", "index knuckle")
     assert hand.body_name(19) == "thumb distal"
     with pytest.raises(InputError, match="icub-left"):
-        hand_named("shadow")
+        hand_named("barrett")
 
 
 def test_right_hand_is_the_mirror_image():

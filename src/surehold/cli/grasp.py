@@ -6,8 +6,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
+from surehold.cli.grasp_options import (
+    Closing,
+    Friction,
+    HandConfigFile,
+    HandName,
+    MeshFrame,
+    MeshMass,
+    MeshUnit,
+    ObjectName,
+    PreshapeName,
+    hand_of,
+    object_of,
+    shown_progress,
+)
 from surehold.cli.options import (
     Initial,
     Method,
@@ -27,13 +42,21 @@ __all__ = ["grasp"]
 
 
 def grasp(
-    obj: Annotated[str, typer.Argument(metavar="OBJECT", help="mug, bottle, glass or drill.")],
+    obj: ObjectName,
     facet: Annotated[
         str, typer.Option(help="The facet that the palm faces, then the one at the thumb.")
     ] = "right-front",
     variables: Annotated[str, typer.Option(help="Free variables, of dx,dy,dz,rx,ry,rz,s1.")] = "dx,dy",
     contact: Annotated[str, typer.Option(help="single, patch or graded (soft touch).")] = "graded",
     quality: Annotated[str, typer.Option(help="epsilon, signed_epsilon, volume, simox, task or closure.")] = "epsilon",
+    unit: MeshUnit = "",
+    mass: MeshMass = None,
+    frame: MeshFrame = None,
+    friction: Friction = None,
+    hand: HandName = "icub-left",
+    hand_config: HandConfigFile = "",
+    preshape: PreshapeName = "",
+    closing: Closing = "adaptive",
     method: Method = "ubo",
     trials: Trials = 100,
     initial: Initial = 40,
@@ -64,11 +87,32 @@ def grasp(
         "variables": list(names),
         "contact": contact,
         "quality": quality,
+        "unit": unit,
+        "mass": mass,
+        "frame": frame,
+        "friction": friction,
+        "hand": hand,
+        "hand config": hand_config,
+        "preshape": preshape,
+        "closing": closing,
     }
     kept = Kept(study, storage, {"grasp": described})
     console = terminal()
-    with announced(console):
-        problem = Grasp(obj, facet, names, contact=contact, quality=quality)
+    body, gripper = object_of(obj, unit, mass, frame, console), hand_of(hand, hand_config)
+    with announced(console), shown_progress("default pose", console) as progress:
+        problem = Grasp(
+            body,
+            facet,
+            names,
+            contact=contact,
+            quality=quality,
+            closing=closing,
+            friction=friction,
+            hand=gripper,
+            preshape=preshape or None,
+            preset="thesis" if preset == "thesis" else "",
+            progress=progress,
+        )
     checker = None
     if check:
         from surehold.grasping.dynamics import GraspChecker
@@ -87,7 +131,9 @@ def grasp(
             pose=f"palm at ({position}) mm, quaternion ({turn}), s1 = {outcome.s1:.2f} rad",
             details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
             | physics,
-            scene=gather.grasp_scene(problem.simulator.scene(outcome)),
+            scene=replace(
+                gather.grasp_scene(problem.simulator.scene(outcome)), neighbors=neighbors_of(problem, candidate)
+            ),
         )
 
     def also_write(report: RunReport, folder: Path) -> None:
@@ -109,19 +155,32 @@ def grasp(
             "facet": facet,
             "variables": ", ".join(problem.box.names),
             "hand": problem.simulator.hand.name,
-            "contact": contact,
-            "quality": quality,
+            "preshape": problem.simulator.preshape,
+            "contact": problem.simulator.contact,
+            "quality": problem.simulator.quality,
+            "closing": problem.simulator.closing,
             "friction": problem.simulator.friction,
             "input noise": noise,
         },
         describe=describe,
         also_write=also_write,
         units=dict(zip(problem.box.names, problem.units, strict=True)),
-        quality_name=f"quality ({quality})",
+        quality_name=f"quality ({problem.simulator.quality})",
         disturbance="the hand is off",
         kept=kept,
         console=console,
     )
+
+
+def neighbors_of(problem: Any, candidate: Any) -> Any:
+    """Return where the hand's grasp center was in a candidate's re-queries, and which were worth less than half."""
+    from surehold.reports.run_report import Neighbors
+
+    if not candidate.values.size or len(candidate.points) != candidate.values.size:
+        return None
+    center = problem.simulator.hand.grasp_center
+    points = np.array([problem.pose(x).apply(center) for x in candidate.points])
+    return Neighbors(points, candidate.values < 0.5 * candidate.quality)
 
 
 def touching_links(names: Sequence[str]) -> str:

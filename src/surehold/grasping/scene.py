@@ -120,7 +120,7 @@ def _shown(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[NDA
         middles = np.column_stack([np.bincount(where, weights=vertices[:, i]) for i in range(3)]) / counts[:, None]
         merged = where[faces]
         kept = (merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2]) & (merged[:, 2] != merged[:, 0])
-        vertices, faces, cell = middles, np.unique(merged[kept], axis=0), 1.5 * cell
+        vertices, faces, cell = middles, np.unique(merged[kept], axis=0).astype(np.int32), 1.5 * cell
     return vertices.astype(np.float32), faces.astype(np.int32)
 
 

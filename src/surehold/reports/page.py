@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from surehold.reports import figures
-from surehold.reports.run_report import Candidate, RunReport
+from surehold.reports.run_report import Candidate, RunReport, Scene
 from surehold.reports.scene import scene_data
 from surehold.reports.verdict import change, coordinates, halved, number, verdict
 
@@ -89,17 +89,16 @@ def scene_context(
     return {
         "scene": None if scene is None else Markup(_json_for_html(scene)),
         "scene_labels": list(labels) or [{"role": "answer", "mark": "", "text": c.label} for c in shown],
-        "scene_moves": any(
-            mesh.poses is not None and len(mesh.poses) > 1
-            for c in shown
-            if c.scene is not None
-            for mesh in c.scene.meshes
-        ),
+        "scene_moves": any(_moves(c.scene) for c in shown if c.scene is not None),
         "scene_has_neighbors": any(c.scene is not None and c.scene.neighbors is not None for c in shown),
         "scene_has_box": any(c.scene is not None and c.scene.box is not None for c in shown),
         "three": Markup("" if scene is None else _vendored("three.bundle.min.js")),
         "scene_script": Markup((TEMPLATES / "scene.js").read_text(encoding="utf-8")),
     }
+
+
+def _moves(scene: Scene) -> bool:
+    return any(mesh.poses is not None and len(mesh.poses) > 1 for mesh in scene.meshes)
 
 
 def _json_for_html(data: Any) -> str:

@@ -38,10 +38,12 @@ def scene_data(candidates: tuple[Candidate, ...]) -> dict[str, Any] | None:
         for mesh in scene.meshes:
             vertices = _buffer(buffers, _finite(mesh.vertices, 3, mesh.name).astype("<f4"))
             faces = _buffer(buffers, _faces(mesh).astype("<u4"))
-            key = (mesh.name, mesh.color, mesh.see_through, vertices, faces)
+            base = (mesh.name, mesh.color, mesh.see_through, vertices, faces)
+            # Two equal bodies of one scene are two: each has a place of its own.
+            key = next(k for k in ((*base, n) for n in range(len(scene.meshes))) if known.get(k) not in indices)
             if key not in known:
                 known[key] = len(meshes)
-                meshes.append(dict(zip(("name", "color", "see_through", "vertices", "faces"), key, strict=True)))
+                meshes.append(dict(zip(("name", "color", "see_through", "vertices", "faces"), base, strict=True)))
             indices.append(known[key])
             poses.append(None if mesh.poses is None else _buffer(buffers, _poses(mesh).astype("<f4")))
         views.append({"label": label, "meshes": indices, "poses": poses, **_marks(scene), "view": list(scene.view)})
