@@ -5,11 +5,11 @@ import pytest
 from scipy import stats
 
 from surehold.campaigns.comparison import claim_results, comparisons, final_values, rows_of, traces
+from surehold.campaigns.costs import cost_table, total_cost_table
 from surehold.campaigns.published import ORIGINAL_SECONDS, published, published_tables
 from surehold.campaigns.sections import (
     campaign_section,
     claims_table,
-    cost_table,
     curves,
     open_places_table,
     plus_minus_remark,
@@ -167,6 +167,14 @@ def test_curves_are_means_with_bands_and_the_first_split():
 def test_costs_stand_beside_the_originals():
     table = cost_table({"table-4.1": records_of("table-4.1", 100, {("GM", "GP"): drawn(0.1, 0.01, 10)})})
     assert table.rows == (("GM", "GP", "thesis", "2.00", "101", "50", "0.056", "2.8"),)
+
+
+def test_a_campaign_is_priced_by_the_runs_made():
+    values = {("RKHS", "GP"): [5.0] * 30, ("RKHS", "TGP-winf"): [5.0] * 15}
+    row = total_cost_table({"table-4.1": records_of("table-4.1", 100, values)}).rows[0]
+    assert row == ("table-4.1", "45 of 200", "1.50", "6.67")  # 2 s a run
+    values["GM", "GP"] = []
+    assert total_cost_table({"a": records_of("table-4.1", 100, values)}).rows[0][-1] == "–"
 
 
 def test_the_printed_plus_minus_is_remarked_upon():

@@ -5,5 +5,5 @@ methods, peers     our optimizer and other libraries' behind one interface
 single_run, runner one run and all of them; a kill loses the runs in flight, the same call continues
 table              the rows on disk
 statistics, comparison, published, thesis   what the runs say, beside each other and beside the thesis
-sections, illustrations, report, reproduction   the page, the CSVs and the document made from them
+sections, costs, illustrations, report, reproduction   the page, the CSVs and the document made from them
 """

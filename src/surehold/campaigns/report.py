@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from surehold.campaigns.comparison import claim_results
+from surehold.campaigns.costs import cost_table, total_cost_table
 from surehold.campaigns.illustrations import grasp_scenes, illustrations
 from surehold.campaigns.plan import ProblemSetup
 from surehold.campaigns.problem_setup import build_problem, noise_of
 from surehold.campaigns.sections import (
     campaign_section,
     claims_table,
-    cost_table,
     open_places_table,
     plus_minus_remark,
 )
@@ -85,11 +85,9 @@ def campaign_report(campaigns: dict[str, Records], *, illustrated: bool = True) 
     sections = [campaign_section(records) for records in campaigns.values()]
     if thesis:
         first = Section("The thesis' claims", plus_minus_remark(campaigns), (claims_table(campaigns),))
-        costs = cost_table(campaigns)
-        sections = [first, *sections]
-        if costs.rows:
-            sections.append(Section("Costs", "", (costs,)))
-        sections.append(Section("Open places", "", (open_places_table(),)))
+        single = cost_table(campaigns)
+        costs = (total_cost_table(campaigns), *([single] if single.rows else []))
+        sections = [first, *sections, Section("Costs", "", costs), Section("Open places", "", (open_places_table(),))]
     scenes = {}
     if thesis and illustrated:
         sections.append(Section("Figures that need no runs", "", (), tuple(illustrations())))

@@ -1,4 +1,4 @@
-"""From tables of runs to what a page shows: published numbers beside ours, curves, claims, tests and costs."""
+"""From tables of runs to what a page shows: published numbers beside ours, curves, claims and tests."""
 
 import math
 from collections.abc import Mapping
@@ -16,13 +16,20 @@ from surehold.campaigns.comparison import (
     rows_of,
     traces,
 )
-from surehold.campaigns.published import ORIGINAL_SECONDS
 from surehold.campaigns.table import Records
 from surehold.campaigns.thesis import OPEN_PLACES, exhibit_of
 from surehold.reports.campaign_report import Band, Line, Mark, Panel, Picture, Section, Table
 from surehold.reports.verdict import number
 
-__all__ = ["campaign_section", "claims_table", "cost_table", "curves", "open_places_table", "plus_minus_remark"]
+__all__ = [
+    "campaign_section",
+    "claims_table",
+    "cost_table",
+    "curves",
+    "open_places_table",
+    "plus_minus_remark",
+    "total_cost_table",
+]
 
 #: The thesis' colors: black GP, blue w1, green w2, red w3, magenta w_inf; then further ones.
 _COLORS: Final = ("#1b1f25", "#0a65b3", "#2e8b57", "#c24e00", "#b03ab0", "#8a6d00", "#00838f", "#795548")
@@ -224,41 +231,6 @@ def open_places_table() -> Table:
         ("place", "the thesis", "chosen"),
         tuple(tuple(place) for place in OPEN_PLACES),
     )
-
-
-def cost_table(campaigns: Mapping[str, Records]) -> Table:
-    """Return CPU seconds of our runs beside the original program's."""
-    body = []
-    for plan in ("table-4.1", "table-4.4"):
-        for name in (plan, f"{plan}-defaults"):
-            records = campaigns.get(name)
-            if records is None:
-                continue
-            seen = set()
-            for row in rows_of(records):
-                original = ORIGINAL_SECONDS.get((row.problem, row.method))
-                if row.ours is None or original is None or (row.problem, row.method) in seen:
-                    continue
-                seen.add((row.problem, row.method))
-                settings = "defaults" if name.endswith("-defaults") else "thesis"
-                body.append(
-                    (
-                        row.problem,
-                        row.method,
-                        settings,
-                        number(row.seconds, 3),
-                        number(original, 3),
-                        number(original / row.seconds, 2),
-                        number(row.seconds * row.planned / 3600.0, 2),
-                        number(original * row.planned / 3600.0, 2),
-                    )
-                )
-    head = ("problem", "method", "settings", "CPU s a run", "original", "ratio", "hours for all runs", "original")
-    note = (
-        "CPU seconds on one core, scoring under noise included. The original's were measured on a quieter machine, on "
-        "which LAPACK's dpotrf of a 140 x 140 matrix takes 0.10 ms."
-    )
-    return Table("costs", "What a run costs", head, tuple(body), (), note)
 
 
 def plus_minus_remark(campaigns: Mapping[str, Records]) -> str:
