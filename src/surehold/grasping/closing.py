@@ -202,6 +202,8 @@ def close_hand(
         _finger_at(fa, t, bases, chains, motion, stop, mine)
         if b == -1:
             gap = capsule_gap(nodes, frame, mine[ka, 0], mine[ka, 1], radius, 0.2 * TOUCH, 0.2)[0]
+            if gap < 2.0 * brush:  # a gap that is underrated now and then hides the closest approach
+                gap = capsule_gap(nodes, frame, mine[ka, 0], mine[ka, 1], radius, 0.2 * TOUCH, 0.0)[0]
         elif b < -1:
             gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[ka, 0], mine[ka, 1], radius)
         else:
