@@ -6,6 +6,7 @@ import time
 
 import pytest
 
+import surehold as sh
 from surehold.cli import run
 
 OWN = """
@@ -300,10 +301,14 @@ def test_a_storage_needs_a_study(capsys):
 
 
 def test_a_grasp_is_kept_and_worked_on(study):
-    line = "grasp mug --trials 4 --initial 4 --study mug"
+    line = "grasp mug --quality volume --closing synergy --trials 4 --initial 4 --study mug"
     assert run(line.split()) == 0
     assert study("status mug")["complete"] == 4
     study("stop mug --trials 6")
     assert run(["study", "work", "mug"]) == 0
-    shown = study("status mug")
-    assert (shown["complete"] + shown["failed"], shown["units"]) == (6, {"dx": "m", "dy": "m"})
+    trials = study("export mug")["trials"]
+    assert len(trials) == 6
+    assert study("status mug")["units"] == {"dx": "m", "dy": "m"}
+    problem = sh.problems.Grasp("mug", quality="volume", closing="synergy")
+    for trial in trials[3:]:  # one made by the command, two by the worker from what the study says of the problem
+        assert trial["value"] == problem([trial["dx"], trial["dy"]])

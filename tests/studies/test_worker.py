@@ -136,9 +136,6 @@ def test_parameters_reach_the_function_as_numbers_or_by_name():
 
 
 def test_the_problem_of_a_study_is_found_again(tmp_path):
-    grasp = {"object": "mug", "facet": "right-front", "variables": ["dx", "dy"], "contact": "graded"}
-    problem = problem_of(StudySettings(SPACE, problem={"grasp": grasp}))
-    assert problem.box.names == ("dx", "dy")
     assert problem_of(StudySettings(SPACE, problem={"synthetic": "rkhs"})).box == sh.problems.RKHS().box
     (tmp_path / "own.py").write_text("def f(x):\n    return 7.0\n")
     assert problem_of(StudySettings(SPACE), f"{tmp_path}/own.py:f")(0) == 7.0

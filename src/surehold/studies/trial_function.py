@@ -1,6 +1,7 @@
 """What the workers of a study try: the problem that is written into the study, or a function of the user's own."""
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,7 +49,7 @@ def problem_of(settings: StudySettings, function: str = "") -> Callable[[Any], A
     InputError
         If there is neither, or it cannot be loaded.
     """
-    from surehold.problems import Grasp, load_function, synthetic_function
+    from surehold.problems import load_function, synthetic_function
 
     if function:
         return load_function(function)
@@ -58,11 +59,35 @@ def problem_of(settings: StudySettings, function: str = "") -> Callable[[Any], A
     if "synthetic" in described:
         return synthetic_function(described["synthetic"])
     if "grasp" in described:
-        arguments = dict(described["grasp"])
-        return Grasp(arguments.pop("object"), arguments.pop("facet"), arguments.pop("variables"), **arguments)
+        return _grasp(described["grasp"], "thesis" if settings.optimizer.get("preset") == "thesis" else "")
     raise InputError(
         "the study says nothing about what its trials are; a robot makes them (surehold study ask, tell), or give "
         "--function package.module:function."
+    )
+
+
+def _grasp(described: Mapping[str, Any], preset: str) -> Callable[[Any], Any]:
+    """Return the grasp that `surehold grasp` has described; files are found by the same paths."""
+    from surehold.grasping.hand_files import load_hand
+    from surehold.grasping.hands import hand_named
+    from surehold.grasping.mesh_files import load_mesh
+    from surehold.problems import Grasp
+
+    obj, hand = described["object"], described["hand"]
+    mesh = Path(obj).suffix or Path(obj).exists()
+    return Grasp(
+        load_mesh(obj, described["unit"] or None, described["mass"], described["frame"] or "auto").object
+        if mesh
+        else obj,
+        described["facet"],
+        described["variables"],
+        contact=described["contact"],
+        quality=described["quality"],
+        closing=described["closing"],
+        friction=described["friction"],
+        hand=load_hand(hand, described["hand config"]) if Path(hand).suffix else hand_named(hand),
+        preshape=described["preshape"] or None,
+        preset=preset,
     )
 
 
