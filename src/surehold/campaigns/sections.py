@@ -24,11 +24,9 @@ from surehold.reports.verdict import number
 __all__ = [
     "campaign_section",
     "claims_table",
-    "cost_table",
     "curves",
     "open_places_table",
     "plus_minus_remark",
-    "total_cost_table",
 ]
 
 #: The thesis' colors: black GP, blue w1, green w2, red w3, magenta w_inf; then further ones.
