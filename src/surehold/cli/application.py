@@ -7,6 +7,7 @@ from surehold.cli.campaign import campaigns
 from surehold.cli.doctor import doctor
 from surehold.cli.grasp import grasp
 from surehold.cli.maximize import maximize
+from surehold.cli.scene import scene
 from surehold.cli.study import studies
 
 __all__ = ["application"]
@@ -24,6 +25,7 @@ def application() -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.command()(grasp)
+    app.command()(scene)
     app.command()(maximize)
     app.command()(doctor)
     app.add_typer(campaigns(), name="campaign")

@@ -1,5 +1,6 @@
 """`surehold grasp OBJECT`: find a grasp that still holds when the hand is off."""
 
+import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -76,9 +77,11 @@ def grasp(
     from surehold.cli.compilation import announced
     from surehold.cli.session import Kept, folder_for, run_session
     from surehold.cli.terminal import terminal
+    from surehold.grasping.formats import grasp_to_dict
     from surehold.problems.grasp import Grasp
-    from surehold.reports import gather
+    from surehold.reports import files, gather
     from surehold.reports.run_report import Candidate, RunReport
+    from surehold.reports.still import still_picture
 
     names = tuple(name.strip() for name in variables.split(",") if name.strip())
     described = {
@@ -138,6 +141,11 @@ def grasp(
 
     def also_write(report: RunReport, folder: Path) -> None:
         write_grasps(problem, report, folder / "grasps.yaml")
+        every = {c.label: {"x": c.x, "grasp": problem.grasp(c.x)} for c in report.candidates}
+        text = json.dumps(grasp_to_dict(every), indent=1, allow_nan=False)
+        files.write_file(folder / "grasps.json", text + "\n")
+        if report.recommended.scene is not None:
+            files.write_file(folder / "grasp.png", still_picture(report.recommended.scene)[0])
 
     run_session(
         problem,

@@ -107,6 +107,8 @@ class shown_progress:  # used as a function
         return self._show
 
     def _show(self, share: float) -> None:
+        if not self._progress.console.is_terminal:
+            return
         if self._task is None:  # nothing is shown of what is in the cache
             self._progress.start()
             self._task = self._progress.add_task(self._what, total=1.0)

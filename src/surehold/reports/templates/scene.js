@@ -94,7 +94,10 @@
   const span = new THREE.Box3();
   data.views.forEach((view) => [0, 1].forEach((share) => {
     place(view, share);
-    view.meshes.forEach((i) => span.expandByObject(solids[i]));
+    view.meshes.forEach((i, n) => {
+      const moves = view.motion[n] && view.motion[n].length > 12;
+      if (moves || !share) span.expandByObject(solids[i], true);
+    });
   }));
   const middle = span.getCenter(new THREE.Vector3());
   const radius = span.getSize(new THREE.Vector3()).length() / 2 || 1;
