@@ -4,6 +4,9 @@ Each takes (dimension, initial design (n, d), seed) and is used with its own def
 would return: the highest observed, unless the library models the input noise itself.
 """
 
+# pyright: reportMissingImports=false
+# The libraries belong to the extra `peers`, which a checkout that is checked need not have.
+
 import importlib.util
 import warnings
 from collections.abc import Callable
@@ -72,7 +75,7 @@ class BayesianOptimization:
     """The package bayesian-optimization with expected improvement."""
 
     def __init__(self, dimension: int, initial: Array, seed: int):
-        from bayes_opt import BayesianOptimization, acquisition  # pyright: ignore[reportMissingImports]
+        from bayes_opt import BayesianOptimization, acquisition
 
         self._names = [f"x{i}" for i in range(dimension)]
         self._optimizer = BayesianOptimization(
@@ -108,7 +111,7 @@ class ScikitOptimize:
     """The package scikit-optimize, Gaussian process with expected improvement."""
 
     def __init__(self, dimension: int, initial: Array, seed: int):
-        from skopt import Optimizer  # pyright: ignore[reportMissingImports]
+        from skopt import Optimizer
 
         self._optimizer = Optimizer(
             [(0.0, 1.0)] * dimension, "gp", n_initial_points=len(initial), acq_func="EI", random_state=seed
