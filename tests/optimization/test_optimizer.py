@@ -9,6 +9,7 @@ from surehold.optimization.hyperparameters import Learning
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.presets import THESIS
+from surehold.problems import RKHS
 
 BOX = Box({"a": (-1.0, 3.0), "b": (0.0, 10.0)})
 NOISE = InputNoise.unit(0.05)
@@ -381,3 +382,13 @@ def test_bad_stored_trials_are_refused_and_nothing_is_lost(X, y, message):
     with pytest.raises(InputError, match=message):
         optimizer.restore(X, y)
     assert optimizer.y.tolist() == [1.0]
+
+
+def test_the_thesis_preset_gives_up_a_point_that_it_proposes_again_and_again():
+    f = RKHS()
+    optimizer = Optimizer(f.box, surrogate="tgp", preset="thesis-rkhs", seed=30, n_initial=5)
+    for _ in range(35):
+        x = optimizer.ask()
+        optimizer.tell(x, f(x))
+    commonest = np.unique(np.round(optimizer.X, 6), axis=0, return_counts=True)[1].max()
+    assert commonest == 3, "once and twice again; without a limit it would be told nothing new to the end"

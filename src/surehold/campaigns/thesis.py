@@ -143,7 +143,7 @@ OPEN_PLACES: Final = (
     OpenPlace(
         "Bias of the expected improvement",
         "ξ = 0.01, scaled by the signal's size.",
-        "As the program has it: 0.0025 for RKHS, 0.05 for GF, 0.0156 for GM, none elsewhere.",
+        "As the program has it: 0.0025 for RKHS, 0.025 for GF, 0.0156 for GM, none elsewhere.",
     ),
     OpenPlace(
         "Free parameter of the unscented transformation",
@@ -196,6 +196,11 @@ OPEN_PLACES: Final = (
         '"One of the sideways facets", the one with the handle for the mug, and the top of the bottle.',
         "right-front for bottle and glass, top-right for the bottle's top, back-right for the mug (its handle is "
         "there), front-right for the drill.",
+    ),
+    OpenPlace(
+        "A point proposed again and again",
+        "Not mentioned; the program jumps to a random point after twenty repetitions.",
+        "A random point after the third trial at one place.",
     ),
     OpenPlace(
         "Local search of the criterion",
