@@ -256,8 +256,8 @@ def test_a_surrogate_of_ones_own():
     [
         ({"surrogate": "forest"}, "surrogate 'forest' is unknown"),
         ({"criterion": "eii"}, "did you mean 'ei'"),
-        ({"criterion": "uei"}, "need input noise"),
-        ({"risk": "cvar"}, "need input noise"),
+        ({"criterion": "uei"}, "needs input noise"),
+        ({"risk": "cvar"}, "needs input noise"),
         ({"risk": "cvarr", "input_noise": NOISE}, "did you mean 'cvar'"),
         ({"design": "grid"}, "initial design"),
         ({"n_initial": 0}, "n_initial"),

@@ -179,7 +179,7 @@ def test_parallel_threads_and_copies():
         ({"surrogate": "gpp"}, "gpp"),
         ({"seed": -1}, "seed"),
         ({"search_space": SPACE, "input_noise": sh.InputNoise({"x": 0.1})}, "says nothing about k"),
-        ({"criterion": "robust_ei"}, "need input noise"),
+        ({"criterion": "robust_ei"}, "needs input noise"),
     ],
 )
 def test_bad_settings_are_refused_at_once(arguments, message):

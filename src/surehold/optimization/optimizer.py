@@ -149,7 +149,8 @@ class Optimizer:
             raise InputError(f"kappa is {kappa!r}; give a finite number of standard deviations.")
         risk = Risk(risk) if isinstance(risk, str) else risk
         if input_noise is None and (name.scale != "exact" or risk.name != "mean"):
-            raise InputError(f"criterion '{criterion}' and risk '{risk.name}' need input noise; give input_noise=.")
+            what = f"risk '{risk.name}'" if risk.name != "mean" else f"criterion '{criterion}'"
+            raise InputError(f"{what} needs input noise; give input_noise=.")
         if input_noise is not None:
             input_noise.warn_if_larger_than(box)
         many = name.scale == "robust" or risk.name != "mean"

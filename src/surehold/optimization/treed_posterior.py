@@ -3,11 +3,11 @@
 Legend
     l   leaves, each with a Gaussian process of its own; m particles in every one
     s   points of a quadrature around each of q queries
-Particle j of the whole is particle j of every leaf. Leaves are independent, so the parts of a weighted sum of function
-values that fall into different leaves add up, their means and their variances alike.
+Particle j of the whole is particle j of every leaf.
 """
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from surehold.optimization.gaussian_process_posterior import GaussianProcessPosterior
 from surehold.optimization.partition import Partition
 from surehold.optimization.surrogate import FitDiagnostics, Moments, PartitionSummary, Regions
+from surehold.optimization.treed_prediction import LeafTable, average_in_leaves
 
 __all__ = ["AveragedTrees", "TreedPosterior"]
 
@@ -36,6 +37,10 @@ class TreedPosterior:
             PartitionSummary(len(leaves), partition.depth, None if split is None else (split[0], split[1])),
         )
 
+    @cached_property
+    def _table(self) -> LeafTable:
+        return LeafTable.of(self.leaves)
+
     def average(
         self,
         queries: NDArray[np.float64],
@@ -50,26 +55,18 @@ class TreedPosterior:
         has its own; slopes, of the same shape and 1 by default, are the derivatives of query + offset by the query,
         coordinate by coordinate.
         """
-        if len(self.leaves) == 1:
-            return self.leaves[0].average(queries, offsets, weights, gradient, slopes)
         q, d = queries.shape
-        points = queries[:, None, :] + offsets
-        m = len(self.leaves[0].hyperparameters.theta)
-        mean, variance = np.zeros((m, q)), np.zeros((m, q))
-        by_mean, by_variance = np.zeros((m, q, d)), np.zeros((m, q, d))
-        for rows, leaf, columns in self._pieces(points):
-            if len(rows) == q and len(columns) == len(weights):  # all in one leaf
-                return self.leaves[leaf].average(queries, offsets, weights, gradient, slopes)
-            own = offsets[columns] if offsets.ndim == 2 else offsets[rows][:, columns]
-            tilt = slopes
-            if slopes is not None:
-                tilt = slopes[columns] if slopes.ndim == 2 else slopes[rows][:, columns]
-            part = self.leaves[leaf].average(queries[rows], own, weights[columns], gradient, tilt)
-            mean[:, rows] += part.mean
-            variance[:, rows] += part.variance
-            if part.mean_gradient is not None and part.variance_gradient is not None:
-                by_mean[:, rows] += part.mean_gradient
-                by_variance[:, rows] += part.variance_gradient
+        shape = (-1, *offsets.shape[-2:])
+        home = self.partition.route((queries[:, None, :] + offsets).reshape(-1, d)).reshape(q, -1)
+        mean, variance, by_mean, by_variance = average_in_leaves(
+            np.ascontiguousarray(queries),
+            np.ascontiguousarray(offsets).reshape(shape),
+            np.ascontiguousarray(np.ones_like(offsets) if slopes is None else slopes).reshape(shape),
+            np.ascontiguousarray(weights),
+            home,
+            self._table,
+            gradient,
+        )
         return Moments(mean, variance, by_mean if gradient else None, by_variance if gradient else None)
 
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
@@ -114,19 +111,12 @@ class TreedPosterior:
         """Take points (q, s, d) apart: queries (rows) of which the same points (columns) fall into the same leaf."""
         q, s, d = points.shape
         home = self.partition.route(points.reshape(-1, d)).reshape(q, s)
-        if (home == home[:, :1]).all():  # no query is split, as ever where inputs are exact
-            every = np.arange(s)
-            for leaf in np.unique(home[:, 0]):
-                yield np.flatnonzero(home[:, 0] == leaf), int(leaf), every
-            return
-        together = home[:, :, None] == home[:, None, :]  # (q, s, s)
-        rows, first = np.nonzero(together.argmax(axis=2) == np.arange(s))  # a query's first point in each of its leaves
-        masks, leaves = together[rows, first], home[rows, first]
-        keys = np.column_stack([np.packbits(masks, axis=1), leaves[:, None].view(np.uint8).reshape(-1, 8)])
-        order = np.lexsort(keys.T)
-        new = np.any(keys[order[1:]] != keys[order[:-1]], axis=1)
-        for piece in np.split(order, np.flatnonzero(new) + 1):  # the sort is stable: rows ascend
-            yield rows[piece], int(leaves[piece[0]]), np.flatnonzero(masks[piece[0]])
+        whole = (home == home[:, :1]).all(axis=1)
+        for leaf in np.unique(home[whole, 0]):
+            yield np.flatnonzero(whole & (home[:, 0] == leaf)), int(leaf), np.arange(s)
+        for row in np.flatnonzero(~whole):
+            for leaf in np.unique(home[row]):
+                yield np.array([row]), int(leaf), np.flatnonzero(home[row] == leaf)
 
 
 class AveragedTrees:
