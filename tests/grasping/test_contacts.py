@@ -115,7 +115,7 @@ def test_a_narrow_hit_fades_into_a_narrow_miss():
     simulator = Simulator(obj="bottle")
     poses = [
         default_pose(simulator.hand, simulator.object, "right-front", 0.0087, (x, 0.0, 0.0, 0.0, 0.0, 0.0))
-        for x in np.arange(-0.0490, -0.0460, 0.000125)
+        for x in np.arange(-0.0510, -0.0460, 0.000125)
     ]
     grasps = [simulator.grasp(pose, -0.7) for pose in poses]
     assert len({"thumb distal" in g.touching for g in grasps}) == 2, "on one side it misses"

@@ -37,7 +37,7 @@ def test_a_good_power_grasp_holds_the_bottle(bottle, checker):
 
 def test_an_empty_hand_and_a_touch_of_fingertips_drop_it(bottle, checker):
     empty = grasp_at(bottle, 0.0, standoff=0.4)
-    touch = grasp_at(bottle, -0.052)
+    touch = grasp_at(bottle, -0.054)
     assert (empty.status, touch.status) == ("no contact", "not closed")
     assert len(touch.contacts) >= 2
     inside = grasp_at(bottle, 0.0)

@@ -47,7 +47,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 CONTACT_MODELS: Final = ("graded", "patch", "single")
-DEPTH: Final = 0.003  #: depth of the soft touch, delta [m]
+DEPTH: Final = 0.006  #: depth of the soft touch, delta [m]: what is so near is reached as finger and object give way
 SKIN: Final = 0.002  #: thickness of the skin, rho [m]
 STATIONS: Final = 5  #: rings of samples along a link
 AROUND: Final = 8  #: samples on a ring

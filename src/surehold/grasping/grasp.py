@@ -173,8 +173,8 @@ class Simulator:
         self.measure: Final = Measure(
             quality, self.object, self.friction, float(torsion), edges, cones, convention, task
         )
-        if not 0.0 < depth <= 0.005:
-            raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.005 m.")
+        if not 0.0 < depth <= 0.008:
+            raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.008 m.")
         self.depth: Final[float] = float(depth)
         self.object_pose: Final[Pose] = Pose() if object_pose is None else object_pose
         self.field: Final[DistanceField] = distance_field_of(self.object)

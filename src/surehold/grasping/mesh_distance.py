@@ -19,7 +19,7 @@ from surehold.grasping.meshes import GraspObject
 
 __all__ = ["mesh_distance"]
 
-FAR_OUTSIDE: Final = 0.012  #: a finger's radius and the depth of a soft touch, and slack [m]
+FAR_OUTSIDE: Final = 0.013  #: a finger's radius and the depth of a soft touch, and slack [m]
 FAR_INSIDE: Final = 0.004  #: skin and soft touch, and slack [m]
 _CHUNK = 20_000
 _ROUNDS = 3  # of offers between neighbors

@@ -2,8 +2,9 @@
 
 For each object and mode the search tries standoffs s from h/3 to h + 20 mm (h the half extent of the object's box
 towards the hand) and thumb postures s1, and for each of them a grid of 15 x 7 offsets (dx, dy) over the bounds of
-`surehold.problems.Grasp`, with graded contacts. Of the pairs that leave a third to two thirds of these poses free of
-collision it takes the one with the highest mean quality; without such a pair, of those nearest to that range.
+`surehold.problems.Grasp`, with graded contacts and a soft touch of 3 mm, that counts what is firmly touched. Of the
+pairs that leave a third to two thirds of these poses free of collision it takes the one with the highest mean quality;
+without such a pair, of those nearest to that range.
 The table holds what was found for the shipped objects, the left iCub hand and its power grasp; what is found for other
 hands and for meshes is kept in the cache folder.
 `python -m surehold.problems.grasp_defaults` repeats the search for the shipped objects and prints the table below.
@@ -37,6 +38,7 @@ class GraspDefault(NamedTuple):
 
 
 _FORMAT: Final = 1  # part of the name of cached results: a change of the search must not find old ones
+_DEPTH: Final = 0.003  # of the soft touch in the search [m]
 _FREE_SHARE: Final = (1.0 / 3.0, 2.0 / 3.0)  # of the coarse grid: 30 to 70 % of all poses, with a margin
 
 #: (object, mode) -> standoff [mm], s1 [rad]; printed by this module
@@ -155,7 +157,7 @@ def grasp_default(
     path = cache_folder() / "defaults" / f"{content_hash(f'{_FORMAT} {simulator.preshape} {mode}', *numbers)}.json"
     known = _load(path)
     if known is None:
-        known = search_default(Simulator(hand, obj, preshape=simulator.preshape), mode, progress)
+        known = search_default(Simulator(hand, obj, preshape=simulator.preshape, depth=_DEPTH), mode, progress)
         with suppress(OSError):  # a folder that cannot be written costs time at the next start and nothing else
             path.parent.mkdir(parents=True, exist_ok=True)
             scratch = path.with_suffix(f".{os.getpid()}.tmp")
@@ -207,7 +209,7 @@ def _middles(n: int) -> NDArray[np.float64]:
 
 def _main() -> None:
     for name in sys.argv[1:] or OBJECTS:
-        simulator = Simulator(obj=name)
+        simulator = Simulator(obj=name, depth=_DEPTH)
         for mode in MODES:
             found = search_default(simulator, mode)
             print(f'    ("{name}", "{mode}"): ({found.standoff * 1e3:.1f}, {found.s1:.2f}),', flush=True)  # noqa: T201
