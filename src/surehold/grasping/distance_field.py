@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 CELL: Final = 0.001  #: edge of a grid cell [m]
-MARGIN: Final = 0.016  #: how far the grid reaches beyond the object: finger radius + soft-touch depth, and slack [m]
+MARGIN: Final = 0.016  #: how far the grid reaches beyond the object at least: a finger's radius and the soft touch [m]
 _FORMAT = 3  #: part of the content hash: a change of the layout must not find an old file
 _CHUNK = 200_000
 
@@ -69,13 +69,17 @@ def cache_folder() -> Path:
 
 
 def distance_field_of(
-    obj: GraspObject, cell: float | None = None, progress: Callable[[float], None] = lambda share: None
+    obj: GraspObject,
+    cell: float | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+    margin: float = MARGIN,
 ) -> DistanceField:
     """Return the distance field of an object, from the cache folder or computed and stored there.
 
     A cache folder that cannot be written costs time at the next start and nothing else. The cell is `CELL` for the
     shipped objects, and for a mesh the larger of that and what keeps the grid to 2 million nodes (1 million from
-    300,000 triangles on). `progress` is called with the share that is done while a field is computed.
+    300,000 triangles on). `progress` is called with the share that is done while a field is computed. The grid reaches
+    `margin` [m] beyond the object, `MARGIN` or more: thick fingers need more.
 
     Raises
     ------
@@ -84,16 +88,16 @@ def distance_field_of(
     """
     lower, upper = obj.vertices.min(axis=0), obj.vertices.max(axis=0)
     if cell is None:
-        cell = CELL if obj.solids else _mesh_cell(upper - lower, len(obj.faces))
+        cell = CELL if obj.solids else _mesh_cell(upper - lower + 2.0 * margin, len(obj.faces))
     if not (np.isfinite(cell) and cell > 0.0):
         raise InputError(f"grid cell is {cell!r}; give a positive length in meters, such as {CELL}.")
-    shape = np.ceil((upper - lower + 2.0 * MARGIN) / cell).astype(int) + 1
+    shape = np.ceil((upper - lower + 2.0 * margin) / cell).astype(int) + 1
     if np.prod(shape.astype(float)) > 5e7:
         raise InputError(
             f"object '{obj.name}' of {' x '.join(f'{s * 1e3:.0f}' for s in upper - lower)} mm needs a grid of "
             f"{' x '.join(map(str, shape))} nodes; give a larger cell than {cell * 1e3:g} mm."
         )
-    frame = np.concatenate([lower - MARGIN, [cell], lower, upper])
+    frame = np.concatenate([lower - margin, [cell], lower, upper])
     name = content_hash(f"{_FORMAT} {bool(obj.solids)}", np.round(obj.vertices, 9), obj.faces, frame)
     path = cache_folder() / "fields" / f"{name}.npy"
     nodes = _load(path, (*shape.tolist(), 4))
@@ -122,7 +126,7 @@ def _compute(
 
 def _mesh_cell(size: NDArray[np.float64], triangles: int) -> float:
     most = 1e6 if triangles >= 300_000 else 2e6
-    needed = float(np.cbrt(np.prod(size + 2.0 * MARGIN) / most))
+    needed = float(np.cbrt(np.prod(size) / most))
     return max(CELL, np.ceil(needed * 1e4) * 1e-4)
 
 

@@ -20,7 +20,7 @@ from surehold.grasping.contacts import (
     skin_samples,
     touch_contacts,
 )
-from surehold.grasping.distance_field import DistanceField, distance_field_of
+from surehold.grasping.distance_field import MARGIN, DistanceField, distance_field_of
 from surehold.grasping.hand import CLOSED, Hand, link_ends, link_frames
 from surehold.grasping.hands import hand_named
 from surehold.grasping.meshes import GraspObject, shipped_object
@@ -177,7 +177,7 @@ class Simulator:
             raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.008 m.")
         self.depth: Final[float] = float(depth)
         self.object_pose: Final[Pose] = Pose() if object_pose is None else object_pose
-        self.field: Final[DistanceField] = distance_field_of(self.object)
+        self.field: Final[DistanceField] = self._field()
         self._reach: Final[Array] = self.hand.reach()
         self._samples: Final[Array] = skin_samples(self.hand)
         self._no_contacts: Final = as_contacts(np.empty((0, 8)), self.hand)
@@ -262,7 +262,12 @@ class Simulator:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # In a worker process the distance field is read from the cache, not sent along.
-        self.__dict__.update(state, field=distance_field_of(state["object"]))
+        self.__dict__.update(state)
+        self.__dict__["field"] = self._field()
+
+    def _field(self) -> DistanceField:
+        needed = float(self.hand.radii.max()) + self.depth + 0.001  # a link is felt from its axis
+        return distance_field_of(self.object, margin=max(MARGIN, np.ceil(1e3 * needed) * 1e-3))
 
     def _collision(self, depth: float) -> float:
         """Return the worth of an open hand whose bodies are inside the object by `depth` together [m]."""
