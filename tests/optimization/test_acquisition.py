@@ -12,11 +12,15 @@ S = np.diag([0.01, 0.0025])
 U = np.array([[0.31, 0.52], [0.8, 0.15], [0.04, 0.97]])
 
 
-@pytest.fixture(scope="module")
-def posterior():
+def posterior_of(noise):
     rng = np.random.default_rng(0)
     X = rng.random((12, 2))
-    return GaussianProcess().fit(X, np.sin(4 * X[:, 0]) * np.cos(3 * X[:, 1])).posterior
+    return GaussianProcess(noise=noise).fit(X, np.sin(4 * X[:, 0]) * np.cos(3 * X[:, 1])).posterior
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    return posterior_of("none")
 
 
 def acquisition_of(posterior, name, border="extend", best=0.3, k=1.0):
@@ -81,15 +85,21 @@ def test_negative_center_weight_gives_minus_infinity_where_the_sum_is_negative(p
     assert not acquisition.with_gradient(grid[[int(np.argmin(plain))]])[1].any()
 
 
-def test_where_to_look_takes_the_trial_that_tells_most(posterior):
+@pytest.mark.parametrize("noise", ["none", 0.1])
+@pytest.mark.parametrize("u", [*U, [0.5, 0.5]])
+def test_where_to_look_takes_the_trial_that_tells_most(noise, u):
+    posterior = posterior_of(noise)
     perturbations = Perturbations(sigma_points(S))
-    u, offsets, weights = U[0], *sigma_points(S)
+    u, offsets, weights = np.asarray(u), *sigma_points(S)
     points = where_to_look(posterior, u, perturbations, offsets)
     assert np.all((points >= 0.0) & (points <= 1.0))
-    left = []
-    for point in points:  # variance of g(u) that is left after a noise-free trial at the point
-        left.append(posterior.with_pending(point[None, :]).average(u[None, :], offsets, weights).variance.mean())
-    assert np.all(np.diff(left) > -1e-6), "a later point tells more than an earlier one"
+
+    def variance(model):
+        return model.average(u[None, :], offsets, weights).variance.mean()
+
+    told = np.array([variance(posterior) - variance(posterior.with_pending(point[None, :])) for point in points])
+    told[np.all(points == u, axis=1)] *= 3.0
+    assert np.all(np.diff(told) < 1e-6), "a later point tells more than an earlier one"
 
 
 @pytest.mark.parametrize("name", ["eii", "robust", "", "u", "robust_uei"])

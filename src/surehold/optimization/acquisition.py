@@ -36,6 +36,10 @@ CRITERIA: Final = (
     "robust_thompson",
 )
 
+# A trial at the very place may become the answer, one beside it seldom does; and in several dimensions there is always
+# some sigma point that tells a little more. With 1, needles in 3 and 5 dimensions take twice the trials.
+_AT_THE_PLACE: Final = 3.0
+
 Scale = Literal["exact", "unscented", "robust"]
 
 
@@ -170,13 +174,13 @@ def where_to_look(
     u: NDArray[np.float64],
     perturbations: Perturbations,
     steps: NDArray[np.float64],
-    noise_variance: float = 0.0,
 ) -> NDArray[np.float64]:
     """Return points (c, d) of the cube around u (d,), the one that tells most about g(u) first.
 
     Trying u itself does not remove the uncertainty about its outcome under input noise. Among u, u + step and
     u + step / 2 for the given steps (s, d), the trial z reduces the variance of g(u) by
     cov(g(u), f(z))^2 / (var f(z) + noise). The covariance comes from var(g + f) = var g + var f + 2 cov(g, f).
+    What u itself tells counts threefold.
     """
     steps = steps[np.any(steps != 0.0, axis=1)]
     points = np.clip(u + np.concatenate([0.0 * steps[:1], steps, 0.5 * steps]), 0.0, 1.0)
@@ -189,7 +193,8 @@ def where_to_look(
     )  # (c, s + 1, d)
     both = posterior.average(np.tile(u, (len(points), 1)), together, weights).variance
     covariance = 0.5 * (both - variance_g - variance_f)  # (m, c)
-    total = variance_f + noise_variance
+    total = variance_f + posterior.noise_variance(points)
     share = np.divide(covariance, np.sqrt(total), out=np.zeros_like(total), where=total > 0.0)
     gain = np.mean(share**2, axis=0)
+    gain[0] *= _AT_THE_PLACE
     return points[np.argsort(-gain, kind="stable")]

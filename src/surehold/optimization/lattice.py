@@ -70,3 +70,7 @@ class LatticePosterior:
     def with_pending(self, X: NDArray[np.float64]) -> "LatticePosterior":
         """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
         return LatticePosterior(self._posterior.with_pending(self._lattice.snap(X)), self._lattice)
+
+    def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance of the observation noise (q,) at the snapped X (q, d), in squared outputs."""
+        return self._posterior.noise_variance(self._lattice.snap(X))

@@ -266,6 +266,10 @@ class LocalGlobalPosterior:
         ]
         return LocalGlobalPosterior(together, particles, self._outputs, self.diagnostics.evaluations)
 
+    def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance of the observation noise (q,): 0, for observations are exact."""
+        return np.zeros(len(X))
+
 
 class LocalGlobalProcess:
     """The local-plus-global process as a surrogate of the optimizer; observations are exact.

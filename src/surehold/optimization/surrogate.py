@@ -112,6 +112,10 @@ class Posterior(Protocol):
         """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
         ...
 
+    def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance of the observation noise (q,) at X (q, d), known or learnt, in squared outputs."""
+        ...
+
 
 class Surrogate(Protocol):
     """A distribution over functions before any trial."""
