@@ -11,6 +11,7 @@ Nothing in a model is executed, and no plugin is loaded; meshes are read from th
 
 import importlib
 import importlib.util
+import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -19,18 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
+from surehold.grasping.capsule_cover import SHORTEST, Capsule, cover_box, cover_mesh
 from surehold.grasping.hand import CLOSED, Hand, Preshape, chain_row
 from surehold.grasping.hand_config import HandConfig, PreshapeConfig, read_hand_config
 
 __all__ = ["load_hand", "packaged_hand"]
 
 Array = NDArray[np.float64]
-Capsule = tuple[Array, Array, float]  # ends of the axis in the frame of a geometry, radius
-
-_SMALL: Final = 1e-5  # a sphere is a capsule of this length [m]
-_PIECE: Final = 0.020  # longest piece of a mesh [m]
 _MOST_BYTES: Final = 64 * 2**20
 _S1_TRIES: Final = 6
+_SMALLEST, _LARGEST = 0.01, 1.0  # of a hand, from the palm to the farthest tip [m]
 
 
 def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
@@ -53,9 +52,7 @@ def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise InputError(f"{str(model)!r} is larger than 64 MB; give a model of the hand alone.")
-        spec = mujoco.MjSpec.from_file(str(path))
-        spec.compiler.fusestatic = False  # bodies keep their names
-        compiled = spec.compile()
+        compiled = _compiled(mujoco, path)
     except OSError as error:
         raise InputError(f"cannot read {str(model)!r}: {error.strerror}.") from None
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
@@ -87,6 +84,20 @@ def packaged_hand(config: str | Path) -> Hand:
     )
 
 
+def _compiled(mujoco: Any, path: Path) -> Any:
+    """Return the model of a file. MuJoCo's warnings, of inertias and the like, do not matter here."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)  # it would write a log into the working directory
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            spec = mujoco.MjSpec.from_file(str(path))
+            spec.compiler.fusestatic = False  # bodies keep their names
+            return spec.compile()
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
 class _Builder:
     """The model at rest, every joint at 0 or at the nearest end of its range, seen from the palm."""
 
@@ -95,6 +106,8 @@ class _Builder:
         self.data = mujoco.MjData(model)
         self.joint_ids = {model.joint(j).name: j for j in range(model.njnt)}
         self.body_ids = {model.body(b).name: b for b in range(model.nbody)}
+        if not model.njnt:
+            raise InputError(f"the model of hand '{config.name}' has no joint; give a hand whose fingers move.")
         self.fingers = {finger: [self._joint(name) for name in names] for finger, names in config.fingers.items()}
         moving = [j for joints in self.fingers.values() for j in joints]
         if len(set(moving)) != len(moving):
@@ -124,13 +137,14 @@ class _Builder:
         """Return the hand."""
         config = self.config
         rows = [self._finger(finger, joints) for finger, joints in self.fingers.items()]
+        self._check_size(rows)
         longest = max(len(row["chain"]) for row in rows)
         f = len(rows)
         chains, radii = np.zeros((f, longest, 19)), np.zeros((f, longest))
         lower, upper = np.zeros((f, longest)), np.zeros((f, longest))
         names = [["" for _ in range(longest)] for _ in rows]
         links = [[f"{finger} {k + 1}" for k in range(longest)] for finger in self.fingers]
-        chains[:, :] = chain_row(np.zeros(3), np.array([_SMALL, 0.0, 0.0]), np.eye(3, 4))
+        chains[:, :] = chain_row(np.zeros(3), np.array([SHORTEST, 0.0, 0.0]), np.eye(3, 4))
         for i, row in enumerate(rows):
             n = len(row["chain"])
             chains[i, :n], radii[i, :n] = row["chain"], row["radii"]
@@ -157,6 +171,29 @@ class _Builder:
             joint_names=flat,
             preshapes={name: self._preshape(name, p, flat, lower, upper) for name, p in config.preshapes.items()},
         )
+
+    def _check_size(self, rows: list[dict[str, Any]]) -> None:
+        """Raise InputError for a hand that is no hand by its size."""
+        name, palm = self.config.name, self.config.palm
+        sizes = []
+        for row in rows:
+            offsets = row["chain"][:, 7:].reshape(-1, 3, 4)[:, :, 3]
+            along = np.linalg.norm(offsets, axis=1).sum() + np.linalg.norm(row["chain"][:, 4:7], axis=1).max()
+            sizes.append(float(np.linalg.norm(row["base"][:, 3]) + along))
+        size = float(np.max(sizes))
+        if not np.isfinite(size):
+            raise InputError(f"the model of hand '{name}' has numbers that are not finite; repair it.")
+        if not _SMALLEST <= size <= _LARGEST:
+            raise InputError(
+                f"hand '{name}' reaches {1e3 * size:.3g} mm from its palm's origin; MuJoCo takes lengths as meters, "
+                f"and a hand is {1e3 * _SMALLEST:g} to {1e3 * _LARGEST:g} mm long."
+            )
+        far = float(np.linalg.norm(palm.grasp_center))
+        if far > 2.0 * size:
+            raise InputError(
+                f"hand '{name}': palm.grasp_center is {1e3 * far:.3g} mm away, the fingers reach {1e3 * size:.3g} mm; "
+                "give it in meters, between palm and fingers."
+            )
 
     def _joint(self, name: str) -> int:
         if name not in self.joint_ids:
@@ -230,7 +267,7 @@ class _Builder:
             ]
             touching += len(capsules)
             if not capsules:
-                capsules = [(f"{finger} {k + 1}", np.zeros(3), np.array([_SMALL, 0.0, 0.0]), 0.0)]
+                capsules = [(f"{finger} {k + 1}", np.zeros(3), np.array([SHORTEST, 0.0, 0.0]), 0.0)]
             if k + 1 < len(joints):
                 q, s = frames[k + 1]
                 offset = np.column_stack([r.T @ s, r.T @ (q - p)])
@@ -279,16 +316,16 @@ class _Builder:
         kind, size = self.model.geom_type[g], self.model.geom_size[g]
         up = np.array([0.0, 0.0, 1.0])
         if kind == int(types.mjGEOM_SPHERE):
-            return [(-0.5 * _SMALL * up, 0.5 * _SMALL * up, float(size[0]))]
+            return [(-0.5 * SHORTEST * up, 0.5 * SHORTEST * up, float(size[0]))]
         if kind == int(types.mjGEOM_CAPSULE):
             return [(-float(size[1]) * up, float(size[1]) * up, float(size[0]))]
         center, half = self._half(g)
         if kind != int(types.mjGEOM_MESH):
-            return _covered(center, half)
+            return cover_box(center, half)
         mesh = int(self.model.geom_dataid[g])
         vertices = self.model.mesh_vert[self.model.mesh_vertadr[mesh] :][: self.model.mesh_vertnum[mesh]]
         faces = self.model.mesh_face[self.model.mesh_faceadr[mesh] :][: self.model.mesh_facenum[mesh]]
-        return _covered_mesh(np.asarray(vertices, dtype=np.float64), np.asarray(faces))
+        return cover_mesh(np.asarray(vertices, dtype=np.float64), np.asarray(faces))
 
     def _palm_boxes(self) -> list[tuple[Array, Array, float]]:
         boxes = []
@@ -310,6 +347,17 @@ class _Builder:
             for joint in given:
                 if joint not in joints:
                     raise unknown_name(f"joint of {name}.{what}", joint, [known for known in joints if known])
+                if joint in self.config.coupling:
+                    raise InputError(
+                        f"hand '{self.config.name}': '{joint}' follows '{self.config.coupling[joint].follows}'; "
+                        f"take it out of {name}.{what}."
+                    )
+                low, high = lower.ravel()[joints.index(joint)], upper.ravel()[joints.index(joint)]
+                if what != "posture" and not low - 1e-3 <= given[joint] <= high + 1e-3:
+                    raise InputError(
+                        f"hand '{self.config.name}': {name}.{what}.{joint} is {given[joint]:g}, outside its range "
+                        f"{low:.4g} to {high:.4g} (radians or meters)."
+                    )
             q = rest.copy().ravel()
             for i, joint in enumerate(joints):
                 if joint in given:
@@ -318,6 +366,11 @@ class _Builder:
                 for joint in (follower, coupling.follows):
                     if joint not in joints:
                         raise unknown_name("joint of coupling", joint, [known for known in joints if known])
+                if coupling.follows in self.config.coupling:
+                    raise InputError(
+                        f"hand '{self.config.name}': '{follower}' follows '{coupling.follows}', which follows too; "
+                        "name the joint that leads them all."
+                    )
                 offset = 0.0 if what == "posture" else coupling.offset
                 q[joints.index(follower)] = coupling.factor * q[joints.index(coupling.follows)] + offset
             return q.reshape(lower.shape)
@@ -335,39 +388,3 @@ class _Builder:
             limits = (config.posture.range[0], config.posture.range[1])
         tries = np.round(np.linspace(*limits, _S1_TRIES + 2)[1:-1], 3).tolist() if limits[0] < limits[1] else [0.0]
         return Preshape(opened, (closed - opened) / CLOSED, posture, limits, limits, tuple(tries))
-
-
-def _covered(center: Array, half: Array, trim: tuple[bool, bool] = (True, True)) -> list[Capsule]:
-    """Return parallel capsules along the longest axis of a box that cover it up to its edges."""
-    order = np.argsort(half, kind="stable")
-    thin, wide, long = (int(k) for k in order)
-    radius = max(float(half[thin]), 1e-4)
-    across = float(half[wide]) - radius
-    count = 1 if across < 0.1 * radius else int(np.ceil(2.0 * across / radius)) + 1
-    ends = [float(half[long]) - (radius if cut else 0.0) for cut in trim]
-    ends = [max(end, 0.5 * _SMALL) for end in ends]
-    capsules = []
-    for shift in np.linspace(-across, across, count) if count > 1 else [0.0]:
-        middle = center + shift * np.eye(3)[wide]
-        capsules.append((middle - ends[0] * np.eye(3)[long], middle + ends[1] * np.eye(3)[long], radius))
-    return capsules
-
-
-def _covered_mesh(vertices: Array, faces: NDArray[np.integer]) -> list[Capsule]:
-    """Return capsules that cover a mesh, piece by piece along its longest axis."""
-    corners = vertices[faces]  # (f, 3, 3)
-    grid = [(i / 8.0, j / 8.0) for i in range(9) for j in range(9 - i)]
-    weights = np.array([(1.0 - u - v, u, v) for u, v in grid])
-    points = np.einsum("sk,fki->fsi", weights, corners).reshape(-1, 3)
-    lower, upper = points.min(axis=0), points.max(axis=0)
-    long = int(np.argmax(upper - lower))
-    count = int(np.ceil((upper - lower)[long] / _PIECE))
-    cuts = np.linspace(lower[long], upper[long], count + 1)
-    capsules = []
-    for i in range(count):
-        piece = points[(points[:, long] >= cuts[i] - 1e-9) & (points[:, long] <= cuts[i + 1] + 1e-9)]
-        if len(piece):
-            low, high = piece.min(axis=0), piece.max(axis=0)
-            low[long], high[long] = cuts[i], cuts[i + 1]
-            capsules += _covered(0.5 * (low + high), 0.5 * (high - low))
-    return capsules

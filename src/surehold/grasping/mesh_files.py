@@ -17,6 +17,7 @@ nearest to the file's axes are taken. `auto` takes the file's own unless the pri
 import io
 import json
 import struct
+import warnings
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
@@ -147,7 +148,9 @@ def _read(file: Path, kind: str) -> tuple[Array, NDArray[np.int64]]:
     elif kind == "obj":
         content = b"\n".join(line for line in content.splitlines() if line[:6] not in (b"mtllib", b"usemtl"))
     try:
-        scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=_Nothing(), process=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of coordinates that are not finite, said below
+            scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=_Nothing(), process=False)
         meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
     except MemoryError:
         raise InputError(f"{file.name!r} does not fit into memory; simplify the mesh.") from None
@@ -221,7 +224,8 @@ def _checked(
     if not np.all(np.isfinite(vertices[used])):
         raise InputError(f"{name!r} has coordinates that are not finite; repair the mesh.")
     size = vertices[used].max(axis=0) - vertices[used].min(axis=0)
-    shown = f"{' x '.join(f'{1e3 * s:.4g}' for s in size)} mm in unit {unit}"
+    numbers = (f"{1e3 * s:.4g}" if s < 10.0 else f"{1e3 * s:,.0f}" for s in size)
+    shown = f"{' x '.join(numbers)} mm in unit {unit}"
     if size.max() < _SMALLEST or size.max() > _LARGEST:
         fitting = [u for u, meters in UNITS.items() if 0.02 <= size.max() / UNITS[unit] * meters <= 0.5]
         guess = f"; is its unit {' or '.join(fitting)}?" if fitting else "."
@@ -250,8 +254,8 @@ def _checked(
         )
     if holes.share > MOST_OPEN:
         raise InputError(
-            f"{name!r} ({shown}) is an open surface: {holes.borders} holes make up {100 * holes.share:.0f} % of its "
-            "area; close it."
+            f"{name!r} ({shown}) is an open surface: {holes.borders} hole{'s' * (holes.borders > 1)} of "
+            f"{100 * holes.share:.0f} % of its area; close it."
         )
     if holes.borders:
         notes.append(
