@@ -95,7 +95,10 @@ def campaign_report(campaigns: dict[str, Records], *, illustrated: bool = True) 
     runs = sum(len(records.done) for records in campaigns.values())
     planned = sum(len(records.header["cells"]) * records.header["runs"] for records in campaigns.values())
     failed = sum(len(records.failed) for records in campaigns.values())
-    facts = [(f"{runs:,}", f"of {planned:,} planned runs"), (str(len(campaigns)), "campaigns")]
+    facts = [
+        (f"{runs:,}", f"of {planned:,} planned runs"),
+        (str(len(campaigns)), "campaign" if len(campaigns) == 1 else "campaigns"),
+    ]
     if failed:
         facts.append((str(failed), "failed runs"))
     notes = [note for records in campaigns.values() for note in records.notes]
