@@ -260,9 +260,10 @@ def test_hands_that_packages_bring(name):
     along = np.ptp(tips[0][present], axis=0) - np.ptp(tips[1][present], axis=0)
     assert along[0] > 0.01, "the fingers close along x"
     qualities = [
-        simulator.grasp(default_pose(hand, simulator.object, "right-front", s, (dx, 0, 0, 0, 0, 0)), s1).quality
+        simulator.grasp(default_pose(hand, simulator.object, "right-front", s, (dx, dy, 0, 0, 0, 0)), s1).quality
         for s in (0.005, 0.013)
         for dx in np.linspace(-0.05, 0.05, 15)
+        for dy in (-0.03, 0.0, 0.03)
         for s1 in (-0.8, -0.5, 0.0)
     ]
     assert max(qualities) > 0.01, "it holds the bottle"

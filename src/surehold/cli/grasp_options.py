@@ -60,7 +60,8 @@ def object_of(name: str, unit: str, mass: float | None, frame: str | None, conso
     from surehold.grasping.meshes import OBJECTS, shipped_object
 
     if name in OBJECTS or not (Path(name).suffix or Path(name).exists()):
-        given = [option for option, value in (("--unit", unit), ("--mass", mass), ("--frame", frame)) if value]
+        options = {"--unit": unit or None, "--mass": mass, "--frame": frame}
+        given = [option for option, value in options.items() if value is not None]
         if name in OBJECTS and given:
             raise InputError(f"{given[0]} is for mesh files; '{name}' is shipped with its own size and mass.")
         return shipped_object(name)
@@ -115,4 +116,5 @@ class shown_progress:  # used as a function
         self._progress.update(self._task, completed=share)
 
     def __exit__(self, *error: object) -> None:
-        self._progress.stop()
+        if self._task is not None:
+            self._progress.stop()

@@ -68,8 +68,8 @@ class Measure:
             raise unknown_name("cones", self.cones, CONES)
         if self.convention not in CONVENTIONS:
             raise unknown_name("convention", self.convention, CONVENTIONS)
-        if not (np.isfinite(self.friction) and self.friction >= 0.0):
-            raise InputError(f"friction is {self.friction!r}; give a number of 0 or more, such as 0.5.")
+        if not 0.0 <= self.friction <= 10.0:
+            raise InputError(f"friction is {self.friction!r}; give a number from 0 to 10, such as 0.5.")
         if not (np.isfinite(self.torsion) and 0.0 <= self.torsion < 0.1):
             raise InputError(f"torsion is {self.torsion!r} m; give a length from 0 to 0.1 m, such as 0.001.")
         if isinstance(self.edges, bool) or not isinstance(self.edges, int | np.integer) or self.edges < 3:

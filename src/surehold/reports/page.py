@@ -77,18 +77,27 @@ def environment() -> Any:
 
 
 def scene_context(
-    shown: Sequence[Candidate], notes: Sequence[str] = (), labels: Sequence[Mapping[str, str]] = ()
+    shown: Sequence[Candidate],
+    notes: Sequence[str] = (),
+    labels: Sequence[Mapping[str, str]] = (),
+    first: int | None = None,
 ) -> dict[str, Any]:
-    """Return what the templates of the 3-D scene need: one view, button and note for each candidate shown."""
+    """Return what the templates of the 3-D scene need: one view, button and note for each candidate.
+
+    The page opens with the candidate number `first`, the last one by default.
+    """
     from markupsafe import Markup
 
     scene = scene_data(tuple(shown))
+    opening = len(shown) - 1 if first is None else first
     if scene is not None:
+        scene["first"] = opening
         for i, (view, candidate) in enumerate(zip(scene["views"], shown, strict=True)):
             view["note"] = notes[i] if notes else f"{candidate.label}."
     return {
         "scene": None if scene is None else Markup(_json_for_html(scene)),
         "scene_labels": list(labels) or [{"role": "answer", "mark": "", "text": c.label} for c in shown],
+        "scene_first": opening,
         "scene_moves": any(_moves(c.scene) for c in shown if c.scene is not None),
         "scene_has_neighbors": any(c.scene is not None and c.scene.neighbors is not None for c in shown),
         "scene_has_box": any(c.scene is not None and c.scene.box is not None for c in shown),

@@ -16,7 +16,7 @@ def render_scenes(
     columns: Sequence[str],
     rows: Sequence[Sequence[str]],
 ) -> str:
-    """Return the page as HTML text: one view for each candidate, the last one shown first, and a table.
+    """Return the page as HTML text: one view for each candidate, the one of highest quality first, and a table.
 
     Raises
     ------
@@ -37,6 +37,6 @@ def render_scenes(
             css=Markup((TEMPLATES / "report.css").read_text(encoding="utf-8")),
             columns=columns,
             rows=rows,
-            **scene_context(candidates, notes),
+            **scene_context(candidates, notes, first=max(range(len(candidates)), key=lambda i: candidates[i].quality)),
         )
     )

@@ -91,18 +91,25 @@
     if (solid.userData.depth) { solid.userData.depth.matrix.copy(solid.matrix); solid.userData.depth.updateMatrixWorld(true); }
   });
 
-  const span = new THREE.Box3();
-  data.views.forEach((view) => [0, 1].forEach((share) => {
-    place(view, share);
-    view.meshes.forEach((i, n) => {
-      const moves = view.motion[n] && view.motion[n].length > 12;
-      if (moves || !share) span.expandByObject(solids[i], true);
+  const spans = data.views.map((view) => {
+    const span = new THREE.Box3();
+    [0, 1].forEach((share) => {
+      place(view, share);
+      view.meshes.forEach((i, n) => {
+        const moves = view.motion[n] && view.motion[n].length > 12;
+        if (moves || !share) span.expandByObject(solids[i], true);
+      });
     });
-  }));
-  const middle = span.getCenter(new THREE.Vector3());
-  const radius = span.getSize(new THREE.Vector3()).length() / 2 || 1;
+    return span;
+  });
+  // A few grasps are compared in one frame; of many to browse each fills the picture.
+  const browsing = data.views.length > 4;
+  const together = spans.reduce((all, span) => all.union(span), new THREE.Box3());
+  const frames = spans.map((span) => browsing ? span : together);
+  const radii = frames.map((frame) => frame.getSize(new THREE.Vector3()).length() / 2 || 1);
 
-  const marks = data.views.map((view) => {
+  const marks = data.views.map((view, i) => {
+    const radius = radii[i];
     const cones = new THREE.Group(), dots = new THREE.Group(), box = new THREE.Group();
     const many = view.contacts.length > 24, drawn = [];
     const length = (many ? 0.13 : 0.17) * radius;
@@ -146,9 +153,10 @@
     return { cones, dots, box, neighbors };
   });
 
-  let current = data.views.length - 1;
+  let current = data.first;
   const controls = new THREE.OrbitControls(camera, renderer.domElement);
   const draw = () => {
+    const radius = radii[current];
     lamp.position.copy(camera.position).add(new THREE.Vector3(0.3 * radius, 0.2 * radius, 1.2 * radius));
     renderer.render(scene, camera);
   };
@@ -188,6 +196,7 @@
     const back = new THREE.Vector3(...data.views[current].view).normalize();
     const right = new THREE.Vector3(0, 0, 1).cross(back).normalize(), up = back.clone().cross(right);
     const tall = Math.tan(camera.fov * Math.PI / 360), wide = tall * stage.clientWidth / stage.clientHeight;
+    const span = frames[current], middle = span.getCenter(new THREE.Vector3());
     let distance = 0;
     for (const x of [span.min.x, span.max.x]) for (const y of [span.min.y, span.max.y]) for (const z of [span.min.z, span.max.z]) {
       const p = new THREE.Vector3(x, y, z).sub(middle);
@@ -203,8 +212,8 @@
     if (!width || !height) return;
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
-    camera.near = radius / 100;
-    camera.far = radius * 30;
+    camera.near = Math.min(...radii) / 100;
+    camera.far = Math.max(...radii) * 30;
     camera.updateProjectionMatrix();
     draw();
   };
@@ -216,7 +225,7 @@
   document.querySelectorAll("[data-show]").forEach((input) => input.addEventListener("change", update));
   if (slider) slider.addEventListener("input", update);
   const chooser = document.getElementById("scene-chooser");
-  if (chooser) chooser.addEventListener("change", () => { current = Number(chooser.value); update(); });
+  if (chooser) chooser.addEventListener("change", () => { current = Number(chooser.value); update(); if (browsing) reset(); });
   document.getElementById("reset").addEventListener("click", reset);
   renderer.domElement.addEventListener("keydown", (event) => {
     const turn = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
