@@ -42,7 +42,7 @@ def test_the_page_holds_everything_and_escapes_what_it_is_told():
     assert "It &lt;holds&gt;." in text
     assert "a &lt;b&gt;note&lt;/b&gt;" in text
     assert "&lt;i&gt;" in text
-    assert '<td class="good">' in text
+    assert '<td class="short good">' in text
     assert text.count("<svg") == 1
     assert "first split" in text
     assert "THREE" not in text, "a page without scenes needs no 3-D library"

@@ -86,9 +86,24 @@ def test_all_kinds_of_parameters_are_drawn(tmp_path):
         asked = study.ask()
         study.tell(asked.id, asked.parameters["n"] - asked.parameters["f"])
     report = study_report(study)
-    assert [v.label for v in report.variables] == ["f [log N]", "n", "c=a", "c=b"]
-    assert render(report)
+    assert [v.label for v in report.variables] == ["f [log N]", "n"]
+    taken = [trial.params["c"] for trial in study.trials()]
+    assert report.choices == {"c": tuple(taken)}
+    assert f", c = {taken[report.recommended.trial]}" in render(report)
+    assert report.surfaces[0].variables == (0, 1)
+    assert report.surfaces[0].note == "slice through the recommended point over f and n"
     assert len(interactive_plots(report)) == 2
+
+
+def test_choices_alone_have_a_page_without_maps(tmp_path):
+    space = SearchSpace({"c": CategoricalDistribution(["a", "b", "c"]), "e": CategoricalDistribution([1, 2])})
+    study = RobotStudy.create("choices", StudySettings(space), str(tmp_path / "j.log"))
+    for _ in range(4):
+        asked = study.ask()
+        study.tell(asked.id, float(asked.parameters["e"]))
+    report = study_report(study)
+    assert report.surfaces == ()
+    assert f"c = {report.choices['c'][report.recommended.trial]}, e = 2" in render(report)
 
 
 def test_interactive_plots_are_plotly_figures(study):

@@ -118,5 +118,5 @@ def test_change():
 
 
 def test_coordinates_use_readable_units():
-    r = report(shaken("recommended", 1.0, []))
-    assert coordinates(r, np.array([-0.01, np.pi / 2, 1.0])) == "dx = −10.0 mm, rx = 90.0°, s = 1.00"
+    there = replace(shaken("recommended", 1.0, []), x=np.array([-0.01, np.pi / 2, 1.0]))
+    assert coordinates(report(there), there) == "dx = −10.0 mm, rx = 90.0°, s = 1.00"

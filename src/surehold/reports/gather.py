@@ -1,6 +1,7 @@
 """From a finished run to the data of its report: candidates, traces, and the model over one or two variables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,6 +85,8 @@ def report_of(
     disturbance: str = "the input is off",
     planned_trials: int | None = None,
     notes: Sequence[str] = (),
+    choices: Mapping[str, tuple[str, ...]] | None = None,
+    hidden: Collection[str] = (),
 ) -> RunReport:
     """Return the report of a run: its trials, its candidates, its traces and its model.
 
@@ -93,6 +96,10 @@ def report_of(
         The input noise that the candidates were scored with, whether or not the optimizer knew of it.
     units
         Unit of each variable by name, such as {"dx": "m", "rx": "rad"}.
+    choices
+        Text of each trial for parameters that are no numbers, by name.
+    hidden
+        Coordinates of the box that say nothing to a reader: those in which the choices are coded.
 
     Raises
     ------
@@ -106,9 +113,11 @@ def report_of(
             raise InputError(
                 f"unit given for '{name}', which is no variable; the variables are {', '.join(box.names)}."
             )
+    shown = [i for i, name in enumerate(box.names) if name not in hidden]
     variables = tuple(
         Variable(name, float(lower), float(upper), (units or {}).get(name, ""))
         for name, lower, upper in zip(box.names, box.lower, box.upper, strict=True)
+        if name not in hidden
     )
     y = result.y
     robust = np.full(y.size, np.nan)
@@ -118,21 +127,24 @@ def report_of(
     return RunReport(
         title=title,
         variables=variables,
-        X=result.X,
+        X=result.X[:, shown],
         y=y,
         n_initial=optimizer.n_initial,
         best_trace=_running_maximum(y),
-        candidates=tuple(candidates),
+        candidates=tuple(replace(candidate, x=candidate.x[shown]) for candidate in candidates),
         settings=settings,
         seed=optimizer.seed,
         quality_name=quality_name,
         disturbance=disturbance,
         robust_trace=robust if np.isfinite(robust).any() else None,
-        noise=None if noise is None else noise.unit_covariance(box) * np.outer(box.widths, box.widths),
-        surfaces=surfaces_of(optimizer.posterior, box, noise, candidates[-1].x),
+        noise=None
+        if noise is None
+        else (noise.unit_covariance(box) * np.outer(box.widths, box.widths))[shown][:, shown],
+        surfaces=surfaces_of(optimizer.posterior, box, noise, candidates[-1].x, shown),
         interrupted=result.interrupted,
         planned_trials=planned_trials,
         notes=tuple(notes),
+        choices=choices or {},
     )
 
 
@@ -152,22 +164,29 @@ def grasp_scene(scene: "GraspScene") -> Scene:
 
 
 def surfaces_of(
-    posterior: Posterior, box: Box, noise: InputNoise | None, x: NDArray[np.floating]
+    posterior: Posterior,
+    box: Box,
+    noise: InputNoise | None,
+    x: NDArray[np.floating],
+    shown: Sequence[int] | None = None,
 ) -> tuple[Surface, ...]:
-    """Return the model over the box for d = 1 and 2; for d > 2 a slice through x over the two most important variables.
+    """Return the model over one or two of the variables that are shown (by default all), a slice through x if d > 2.
 
-    A variable matters as much as the posterior mean varies along it through x.
+    Where more than two are shown it is over the two most important ones: a variable matters as much as the posterior
+    mean varies along it through x.
     """
     center = np.clip(box.to_unit(x), 0.0, 1.0)
-    if box.dimension == 1:
-        return (_surface(posterior, box, noise, center, (0,), _LINE, ""),)
-    if box.dimension == 2:
-        return (_surface(posterior, box, noise, center, (0, 1), _SQUARE, ""),)
-    first, second = sorted(_most_important(posterior, center))
-    note = (
-        f"slice through the recommended point over {box.names[first]} and {box.names[second]}, the two that matter most"
-    )
-    return (_surface(posterior, box, noise, center, (first, second), _SQUARE, note),)
+    among = list(range(box.dimension) if shown is None else shown)
+    if not among:
+        return ()
+    over = sorted(_most_important(posterior, center, among)) if len(among) > 2 else among
+    note = ""
+    if len(over) < box.dimension:
+        note = f"slice through the recommended point over {' and '.join(box.names[k] for k in over)}"
+    if len(among) > 2:
+        note += ", the two that matter most"
+    surface = _surface(posterior, box, noise, center, tuple(over), _LINE if len(over) == 1 else _SQUARE, note)
+    return (replace(surface, variables=tuple(among.index(k) for k in over)),)
 
 
 def _surface(
@@ -195,15 +214,15 @@ def _surface(
     )
 
 
-def _most_important(posterior: Posterior, center: NDArray[np.float64]) -> tuple[int, int]:
+def _most_important(posterior: Posterior, center: NDArray[np.float64], among: Sequence[int]) -> list[int]:
     line = np.linspace(0.0, 1.0, 41)
     variation = []
-    for k in range(center.size):
+    for k in among:
         queries = np.tile(center, (line.size, 1))
         queries[:, k] = line
         variation.append(float(np.var(mixture(posterior.moments(queries))[0])))
     order = np.argsort(-np.array(variation), kind="stable")
-    return int(order[0]), int(order[1])
+    return [among[i] for i in order[:2]]
 
 
 def _unit_answer(result: Result) -> NDArray[np.float64]:

@@ -148,7 +148,7 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         "title": label["text"],
         "tag": tag,
         "tag_class": "no" if tag == "refused" else "yes",
-        "where": coordinates(report, candidate.x),
+        "where": coordinates(report, candidate),
         "quality": number(candidate.quality),
         "mean": number(candidate.mean) if shaken else "",
         "worst": number(candidate.worst),
@@ -209,6 +209,8 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
     rows = [
         row(v.label, lambda c, i=i, v=v: number(float(c.x[i]) * v.factor, 4)) for i, v in enumerate(report.variables)
     ]
+    for name, texts in report.choices.items():
+        rows.append(row(name, lambda c, texts=texts: "–" if c.trial is None else texts[c.trial]))
     if any(c.pose for c in every):
         rows.append(row("pose", lambda c: c.pose or "–"))
     if any(c.status for c in every):
@@ -263,6 +265,7 @@ def _trials(report: RunReport) -> list[dict[str, Any]]:
             {
                 "number": i + 1,
                 "x": [number(float(v), 4) for v in x],
+                "choices": [texts[i] for texts in report.choices.values()],
                 "y": "failed" if failed else number(float(y), 4),
                 "note": ", ".join(notes),
                 "style": style,

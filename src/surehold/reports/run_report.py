@@ -172,6 +172,7 @@ class RunReport:
     interrupted: bool = False
     planned_trials: int | None = None
     notes: tuple[str, ...] = ()
+    choices: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: parameters that are no numbers: (n,) each
 
     def __post_init__(self):
         n, d = self.y.size, len(self.variables)

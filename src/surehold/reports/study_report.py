@@ -30,6 +30,8 @@ def study_report(study: RobotStudy) -> RunReport:
         notes.append(f"The study is {'paused' if study.paused else 'stopped'}: {reason}.")
     notes.append("Trials are counted from 1 here, in the order of their ids, which begin at 0.")
     rule = study.stop_rule
+    rows = [space.decode(x) for x in result.X]
+    names = [name for name in space.distributions if name not in box.names]
     return gather.report_of(
         result,
         [_candidate(result, label, index) for label, index in gather.answers(result).items()],
@@ -39,6 +41,8 @@ def study_report(study: RobotStudy) -> RunReport:
         units=units,
         planned_trials=rule.trials,
         notes=notes,
+        choices={name: tuple(str(row[name]) for row in rows) for name in names},
+        hidden=[name for name in box.names if name not in space.distributions],
     )
 
 

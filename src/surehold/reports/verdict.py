@@ -32,13 +32,15 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:.{max(digits - 1 - size, 0)}f}".replace("-", "−")
 
 
-def coordinates(report: RunReport, x: np.ndarray) -> str:
-    """Return a point (d,) as `dx = 3.1 mm, rx = 12°`."""
+def coordinates(report: RunReport, candidate: Candidate) -> str:
+    """Return where a candidate is, as `dx = 3.1 mm, rx = 12°`."""
     parts = []
-    for variable, value in zip(report.variables, x, strict=True):
+    for variable, value in zip(report.variables, candidate.x, strict=True):
         unit = variable.shown_unit
         space = "" if unit in ("", "°") else " "
         parts.append(f"{variable.name} = {number(float(value) * variable.factor)}{space}{unit}")
+    if candidate.trial is not None:
+        parts += [f"{name} = {texts[candidate.trial]}" for name, texts in report.choices.items()]
     return ", ".join(parts)
 
 
@@ -65,7 +67,7 @@ def verdict(report: RunReport) -> Verdict:
             )
         return Verdict(
             f"The best {name} found is {number(highest.quality)}.",
-            f"It was met at {coordinates(report, highest.x)} ({_trial(highest)} of {report.y.size}). {why}",
+            f"It was met at {coordinates(report, highest)} ({_trial(highest)} of {report.y.size}). {why}",
             False,
         )
     if len(report.candidates) == 1:
@@ -126,7 +128,7 @@ def _of_the_model(report: RunReport) -> Verdict:
         f"The highest peak ({number(highest.quality)}) is not recommended: when {off}, the model expects "
         f"{number(highest.predicted_mean)} of it, and {expected} of the recommended point."
     )
-    where = f"Recommended is {coordinates(report, answer.x)} ({_trial(answer)} of {report.y.size}). {text}"
+    where = f"Recommended is {coordinates(report, answer)} ({_trial(answer)} of {report.y.size}). {text}"
     return Verdict(headline, where, True)
 
 
