@@ -13,6 +13,8 @@ from optuna.trial import TrialState
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.studies.history import REACHED
+from surehold.studies.ledger import VETOED
 from surehold.studies.robot import NothingToAsk, RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
@@ -116,6 +118,24 @@ def test_telling_twice(robot):
     with pytest.raises(InputError, match="told before: failed"):
         other.tell(failing.id, 1.0)
     assert [t.value for t in robot.trials()] == [0.25, None]
+
+
+def test_what_a_dead_teller_left_behind_is_not_believed(robot):
+    asked = robot.ask()
+    stored = robot.trials()[asked.id]
+    robot.storage.backend.set_trial_user_attr(stored._trial_id, REACHED, asked.parameters | {"dx": 0.05})
+    robot.tell(asked.id, 0.5)
+    assert robot.trials()[asked.id].user_attrs[REACHED] == asked.parameters
+
+
+def test_an_answer_quicker_than_a_veto_counts(robot):
+    asked = robot.ask()
+    stored = robot.trials()[asked.id]
+    robot.storage.backend.set_trial_user_attr(stored._trial_id, VETOED, "too late")
+    robot.tell(asked.id, 0.5)
+    assert robot.tell(asked.id, 0.5).already
+    with pytest.raises(InputError, match=r"value 0\.5"):
+        robot.veto(asked.id)
 
 
 def test_what_was_reached_is_what_the_model_learns_from(robot):

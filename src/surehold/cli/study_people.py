@@ -128,5 +128,6 @@ def import_trials(
     else:
         found = warm_start.trials_of_study(warm_start.former_study(study, source), names)
     left_out = warm_start.import_trials(target, found, skip_bad=skip_bad)
-    lines = [f"{len(found) - len(left_out)} trials imported into {name}", *(f"left out: {why}" for why in left_out)]
-    say({"imported": len(found) - len(left_out), "left_out": left_out}, "\n".join(lines), as_json)
+    count = len(found) - len(left_out)
+    lines = [f"{count} trial{'s' * (count != 1)} imported into {name}", *(f"left out: {why}" for why in left_out)]
+    say({"imported": count, "left_out": left_out}, "\n".join(lines), as_json)

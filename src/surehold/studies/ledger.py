@@ -147,8 +147,8 @@ class Ledger:
         state = "failed" if number is None else "complete"
         if not trial.state.is_finished():
             try:
-                if actual is not None:
-                    self._backend.set_trial_user_attr(trial._trial_id, REACHED, actual)
+                if actual is not None or REACHED in trial.user_attrs:  # left by a teller that died before its answer
+                    self._backend.set_trial_user_attr(trial._trial_id, REACHED, actual or trial.params)
                 if number is None:
                     self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
                 else:
@@ -174,7 +174,7 @@ class Ledger:
             self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
         except UpdateFinishedTrialError:
             trial = self.trial(id)
-            if VETOED not in trial.user_attrs:
+            if VETOED not in trial.user_attrs or trial.state != TrialState.FAIL:
                 raise AnswerRefused(
                     f"trial {id} is finished ({answer_of(trial)}); only a pending one can be vetoed."
                 ) from None
@@ -188,7 +188,7 @@ def holder_of(trial: FrozenTrial) -> Holder | None:
 
 def answer_of(trial: FrozenTrial) -> str:
     """Return in words what a finished trial was told."""
-    if VETOED in trial.user_attrs:
+    if VETOED in trial.user_attrs and trial.state == TrialState.FAIL:  # not where an answer was quicker than the veto
         return f"vetoed ({trial.user_attrs[VETOED]})"
     return f"value {trial.values[0]!r}" if trial.state == TrialState.COMPLETE and trial.values else "failed"
 
