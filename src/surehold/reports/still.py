@@ -128,7 +128,8 @@ def _by_matplotlib(scene: Scene, width: int, height: int) -> bytes:
     FigureCanvasAgg(figure)
     plot = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     plot.set_axis_off()
-    plot.add_collection(PolyCollection(list(triangles[order][:, :, :2]), facecolors=rgba[order], edgecolors="none"))
+    smooth = rgba[order][:, 3] < 1.0  # smooth edges leave seams between opaque triangles, hard ones double clear ones
+    plot.add_collection(PolyCollection(list(triangles[order][:, :, :2]), facecolors=rgba[order], antialiaseds=smooth))
     if scene.contacts is not None and len(scene.contacts.points):
         points = np.asarray(scene.contacts.points) @ axes
         plot.scatter(points[:, 0], points[:, 1], s=14, c="#e8384f", zorder=3)
