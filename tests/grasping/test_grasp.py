@@ -135,6 +135,8 @@ def test_scene_holds_watertight_bodies_in_the_world(simulator):
         ({"edges": True}, "edges"),
         ({"depth": 0.0}, "depth of the soft touch"),
         ({"depth": 0.1}, "depth of the soft touch"),
+        ({"object_pose": Pose((0.0, 0.0, float("nan")))}, "object_pose"),
+        ({"friction": 1e9}, "0 to 10"),
         ({"torsion": 1.0}, "torsion is 1.0 m"),
         ({"cones": "square"}, "polyhedral, round"),
         ({"collision": "ignored"}, "penalty, zero"),

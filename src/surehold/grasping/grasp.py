@@ -177,6 +177,8 @@ class Simulator:
             raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.008 m.")
         self.depth: Final[float] = float(depth)
         self.object_pose: Final[Pose] = Pose() if object_pose is None else object_pose
+        if not np.all(np.isfinite([*self.object_pose.position, *self.object_pose.quaternion])):
+            raise InputError(f"object_pose {object_pose} is not finite; give finite numbers.")
         self.field: Final[DistanceField] = self._field()
         self._reach: Final[Array] = self.hand.reach()
         self._samples: Final[Array] = skin_samples(self.hand)
