@@ -7,6 +7,8 @@ import trimesh
 from surehold.errors import InputError
 from surehold.grasping import Pose, Simulator, default_pose, shipped_object
 from surehold.grasping.dynamics import LOADS, GraspChecker
+from surehold.grasping.hand_config import read_hand_config
+from surehold.grasping.hand_files import load_hand
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +60,31 @@ def test_what_is_heavy_or_slippery_or_held_weakly_is_lost(bottle):
     assert GraspChecker(bottle, finger_force=0.05).check(grasp).verdict != "held"
     slippery = Simulator(obj="bottle", friction=0.02)
     assert GraspChecker(slippery).check(grasp_at(slippery, -0.032)).verdict != "held"
+
+
+def test_fingers_that_slide_squeeze_too(tmp_path):
+    model, config = tmp_path / "gripper.xml", tmp_path / "gripper.yaml"
+    model.write_text("""
+<mujoco><worldbody><body name="palm"><geom type="box" size=".05 .02 .01"/>
+  <body name="left" pos="-.045 0 .02"><joint name="left" type="slide" axis="1 0 0" range="0 .04"/>
+    <geom type="box" pos="0 0 .03" size=".005 .01 .03"/></body>
+  <body name="right" pos=".045 0 .02"><joint name="right" type="slide" axis="-1 0 0" range="0 .04"/>
+    <geom type="box" pos="0 0 .03" size=".005 .01 .03"/></body>
+</body></worldbody></mujoco>""")
+    config.write_text("""
+name: gripper
+palm: {body: palm, x: [1, 0, 0], z: [0, 0, 1], grasp_center: [0, 0, 0.06]}
+fingers: {left: [left], right: [right]}
+finger_force: 40
+preshapes: {pinch: {closed: {left: 0.04, right: 0.04}}}
+""")
+    simulator = Simulator(load_hand(model, read_hand_config(config)), "bottle")
+    grasp = simulator.grasp(default_pose(simulator.hand, simulator.object, "right-front", 0.0, (0.0,) * 6), 0.0)
+    assert grasp.quality > 0.005
+    strong = GraspChecker(simulator)
+    assert strong.finger_force == 40.0
+    assert strong.check(grasp).verdict == "held"
+    assert GraspChecker(simulator, finger_force=1.0).check(grasp).verdict == "dropped"
 
 
 def test_repetition_and_threads_change_nothing(bottle, checker):

@@ -36,7 +36,6 @@ __all__ = ["LOADS", "GraspCheck", "GraspChecker", "LoadOutcome"]
 Verdict = Literal["held", "slipped", "dropped"]
 _VERDICTS: Final[tuple[Verdict, ...]] = ("held", "slipped", "dropped")
 
-FINGER_FORCE: Final = 8.0  #: default F, about what a tendon-driven finger of this size exerts [N]
 SQUEEZE: Final = 0.5  #: time in which the fingers squeeze, before the load [s]
 LOAD_TIME: Final = 1.0  #: time under load [s]
 SHAKE: Final = 5.0  #: acceleration of the shake [m/s^2]
@@ -48,7 +47,7 @@ _GRAVITY = 9.81
 _STEP = 0.002  # s
 _PHASE = 0.1  # controls are constant for so long [s]
 _BENT, _SHIFT = 0.35, 0.01  # how far targets move on beyond the touch [rad, m]; torque is at its limit from half on
-_SLOW = 0.03  # joints with a smaller rate of closing hold their place [rad per unit of the closing parameter]
+_SLOW = 0.03  # joints that turn with a smaller rate of closing hold their place [rad per unit of the closing parameter]
 _BEATS = 2  # phases until the shake turns around
 _STIFF = 40.0  # stiffness of a joint that does not close, relative to its torque limit [1/rad]
 
@@ -93,7 +92,7 @@ class GraspChecker:
     simulator
         Whose hand, object and friction are taken.
     finger_force
-        F, the force of a stretched finger at its tip [N].
+        F, the force of a stretched finger at its tip [N]; the hand's own if not given.
     mass
         Mass of the object [kg]; its own if not given.
     threads
@@ -106,9 +105,17 @@ class GraspChecker:
     """
 
     def __init__(
-        self, simulator: Simulator, *, finger_force: float = FINGER_FORCE, mass: float | None = None, threads: int = 1
+        self,
+        simulator: Simulator,
+        *,
+        finger_force: float | None = None,
+        mass: float | None = None,
+        threads: int = 1,
     ):
         mujoco = _mujoco()
+        hand = simulator.hand
+        if finger_force is None:
+            finger_force = hand.finger_force
         if not (np.isfinite(finger_force) and 0.0 < finger_force <= 1000.0):
             raise InputError(f"finger_force is {finger_force!r} N; give a force above 0 and up to 1000 N, such as 8.")
         self.mass: Final[float] = simulator.object.mass if mass is None else float(mass)
@@ -118,12 +125,10 @@ class GraspChecker:
             raise InputError(f"threads are {threads!r}; give an integer of 1 or more.")
         self.simulator: Final = simulator
         self.finger_force: Final[float] = float(finger_force)
-        hand = simulator.hand
-        self._closing: Final = np.sign(hand.preshapes[simulator.preshape].rate) * (
-            np.abs(hand.preshapes[simulator.preshape].rate) > _SLOW
-        )
-        self._moving: Final = np.flatnonzero(hand.joint_names)  # those of (f j,) that move
         slides = hand.chains[:, :, 0] > 0.0
+        rate = hand.preshapes[simulator.preshape].rate
+        self._closing: Final = np.sign(rate) * (np.abs(rate) > np.where(slides, 0.0, _SLOW))
+        self._moving: Final = np.flatnonzero(hand.joint_names)  # those of (f j,) that move
         self._bent: Final = np.where(slides, _SHIFT, _BENT)
         levers = np.where(slides, 1.0, np.maximum(hand.reach().max(axis=2), 0.005))
         self._limits: Final = self.finger_force * levers  # (f, j) N m, or N for joints that slide

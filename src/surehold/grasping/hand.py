@@ -55,6 +55,7 @@ class Hand:
     link_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index distal"
     joint_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index_distal"; "" for one that does not move
     preshapes: Mapping[str, Preshape] = field(repr=False)  #: grasp types; the first one is the default
+    finger_force: float = 8.0  #: what a stretched finger can exert at its tip [N]; the check by physics takes it
 
     @property
     def palm(self) -> int:

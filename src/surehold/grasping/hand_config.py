@@ -13,6 +13,7 @@
     coupling:                      # optional: joints that follow others, q = factor * leader + offset
       index_3: {follows: index_2, factor: 0.8}
     contact_links: [index_tip]     # optional: only these bodies of the fingers can touch; all of them otherwise
+    finger_force: 8                # optional: what a stretched finger can exert at its tip [N]
     preshapes:                     # types of grasp; the first one is the default [rad or m]
       power:
         open: {index_1: 0.1}       # joints that are not named are at 0, or at the nearest end of their range
@@ -95,6 +96,7 @@ class HandConfig(_Strict):
     fingers: Annotated[dict[str, Annotated[list[str], Field(min_length=1, max_length=8)]], Field(min_length=1)]
     coupling: dict[str, Coupling] = {}
     contact_links: list[str] | None = None
+    finger_force: Annotated[FiniteFloat, Field(gt=0.0, le=1000.0)] = 8.0
     preshapes: Annotated[dict[str, PreshapeConfig], Field(min_length=1)]
     model: PackagedModel | None = None
 

@@ -170,6 +170,7 @@ class _Builder:
             link_names=tuple(name for row in links for name in row),
             joint_names=flat,
             preshapes={name: self._preshape(name, p, flat, lower, upper) for name, p in config.preshapes.items()},
+            finger_force=config.finger_force,
         )
 
     def _check_size(self, rows: list[dict[str, Any]]) -> None:
