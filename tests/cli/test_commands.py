@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from surehold.cli import run
+from surehold.reports import files
 
 OWN = """
 import os, signal
@@ -159,7 +160,22 @@ def test_interrupt_keeps_what_was_done(here, capsys):
 @pytest.mark.usefixtures("interruptible")
 def test_interrupt_before_anything(capsys):
     assert surehold("maximize own.py:stopped_at_once --bounds a=0:1") == 130
-    assert "nothing to keep" in capsys.readouterr().err
+    assert "interrupted; what was finished before is kept" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_interrupt_while_writing_waits(here, capsys, monkeypatch):
+    write_run = files.write_run
+
+    def interrupted(report, folder):
+        os.kill(os.getpid(), signal.SIGINT)
+        return write_run(report, folder)
+
+    monkeypatch.setattr(files, "write_run", interrupted)
+    assert surehold("maximize own.py:hill --bounds a=0:1 --trials 8 --initial 6") == 0
+    assert "Writing what was found" in capsys.readouterr().out
+    assert (here / "runs" / "hill-ubo-seed0" / "report.html").is_file()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_short_grasp_run(here, capsys):

@@ -44,7 +44,7 @@ def run(arguments: list[str]) -> int:
 
 
 def _interrupted() -> int:
-    _say("interrupted before any trial gave a value; there is nothing to keep.")
+    _say("interrupted; what was finished before is kept.")
     return 130
 
 

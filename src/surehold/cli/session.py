@@ -16,11 +16,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from surehold.cli.compilation import announced, warm_up
+from surehold.cli.interruption import undisturbed
 from surehold.cli.terminal import terminal
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.maximization import Result, Trial, maximize
-from surehold.problems.perturbation import robust_score
+from surehold.problems.perturbation import RobustScore, robust_score
 from surehold.problems.problem import Problem
 from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
@@ -119,36 +120,36 @@ def run_session(
     if result.interrupted:
         console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
     notes = _failures(result)
-    candidates = []
+    scores: dict[tuple[str, int], RobustScore | None] = {}
     for label, index in gather.answers(result).items():
-        score = None
+        scores[label, index] = None
         if noise is not None:
             try:
-                score = robust_score(problem, result.X[index], noise, n=REQUERIES, seed=seed)
+                scores[label, index] = robust_score(problem, result.X[index], noise, n=REQUERIES, seed=seed)
             except KeyboardInterrupt:
                 notes = [*notes, f"The re-queries of the {label} point were interrupted and left out."]
-        candidates.append(describe(gather.candidate(result, label, index, score)))
-    report = gather.report_of(
-        result,
-        candidates,
-        title=title,
-        settings={
-            **settings,
-            "method": method,
-            "trials": trials,
-            "initial trials": initial,
-            "preset": preset or None,
-            "study": kept.study if kept and kept.study else None,
-        },
-        noise=noise,
-        units=units,
-        quality_name=quality_name,
-        disturbance=disturbance,
-        planned_trials=trials,
-        notes=notes,
-    )
-    path = files.write_run(report, folder)
-    also_write(report, folder)
+    with undisturbed(console):
+        report = gather.report_of(
+            result,
+            [describe(gather.candidate(result, label, i, score)) for (label, i), score in scores.items()],
+            title=title,
+            settings={
+                **settings,
+                "method": method,
+                "trials": trials,
+                "initial trials": initial,
+                "preset": preset or None,
+                "study": kept.study if kept and kept.study else None,
+            },
+            noise=noise,
+            units=units,
+            quality_name=quality_name,
+            disturbance=disturbance,
+            planned_trials=trials,
+            notes=notes,
+        )
+        path = files.write_run(report, folder)
+        also_write(report, folder)
     _show(report, path, time.perf_counter() - started, console)
     if open_report:
         webbrowser.open(path.resolve().as_uri())

@@ -95,9 +95,12 @@ class StudySettings:
         found = []
         for part, name in (("parameters", "parameter"), ("units", "unit of"), ("optimizer", ""), ("problem", "")):
             for key in mine[part] | theirs[part]:
-                ours, asked = (_short(side[part].get(key)) for side in (mine, theirs))
+                ours, asked = (side[part].get(key) for side in (mine, theirs))
+                if part == "problem" and isinstance(ours, dict) and isinstance(asked, dict):
+                    differing = [k for k in ours | asked if ours.get(k) != asked.get(k)]
+                    ours, asked = ({k: side.get(k) for k in differing} for side in (ours, asked))
                 if ours != asked:
-                    found.append(f"{name} {key}: {ours} in the study, {asked} now".strip())
+                    found.append(f"{name} {key}: {_short(ours)} in the study, {_short(asked)} now".strip())
         if mine["input_noise"] != theirs["input_noise"]:
             found.append(
                 f"input noise: {_short(mine['input_noise'])} in the study, {_short(theirs['input_noise'])} now"
