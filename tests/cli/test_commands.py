@@ -168,7 +168,7 @@ def test_interrupt_while_writing_waits(here, capsys, monkeypatch):
     write_run = files.write_run
 
     def interrupted(report, folder):
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
         return write_run(report, folder)
 
     monkeypatch.setattr(files, "write_run", interrupted)
