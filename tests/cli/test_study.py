@@ -194,6 +194,8 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("create a --parameters x=0:1 --problem own.py:hil", "did you mean 'hill'"),
         ("create a --parameters dx=0:1 --storage mysql://x/y", "of no kind that is known"),
         ("create a --parameters dx=0:1 --storage own.py", "is no journal"),
+        ("stop mug --hours -1", "--hours is -1"),
+        ("stop mug --hours nan", "--hours is nan"),
         ("tell mug 0", "has no value"),
         ("tell mug 0 nan", "finite"),
         ("tell mug 0 inf", "finite"),

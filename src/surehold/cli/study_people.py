@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from surehold.cli.study_options import Json, Name, Storage, opened, say
+from surehold.errors import InputError
 
 __all__ = ["commands"]
 
@@ -88,6 +89,8 @@ def stop(
     from surehold.studies.stop_rule import StopRule
 
     study = opened(name, storage)
+    if hours is not None and not 0.0 < hours < 1e6:
+        raise InputError(f"--hours is {hours:g}; give a number above 0, such as 8.")
     until = None if hours is None else time.time() + 3600.0 * hours
     study.set_stop_rule(StopRule(trials, until, improvement, asks))
     reason = study.stopped()
