@@ -47,7 +47,8 @@ def factorize(X, Y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, inver
                 return -1
         if nugget > ratio:
             repaired += 1
-        alpha[j] = Y[j]
+        for i in range(n):  # an assignment of arrays takes two seconds to compile
+            alpha[j, i] = Y[j, i]
         solve_lower(A, alpha[j])
         solve_lower_transposed(A, alpha[j])
         invert_lower(A, inverse_L[j])
@@ -179,13 +180,12 @@ def sample(P, normals, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha
                     C[w, o] = s2[j] * C[w, o] + mean_variance
             C -= np.dot(V.T, V)
             nugget = 1e-10 * (s2[j] + mean_variance)
-            root = C.copy()
             while True:
+                root = C.copy()
                 for w in range(s):
-                    root[w, w] = C[w, w] + nugget
+                    root[w, w] += nugget
                 if cholesky(root):
                     break
-                root[:] = C
                 nugget *= 10.0
             mean = np.dot(alpha[j], K)
             for b in range(normals.shape[0]):

@@ -57,52 +57,56 @@ class LeafTable(NamedTuple):
 
 
 @njit(cache=True)
-def _add_part(rows, columns, leaf, Q, offsets, slopes, weights, table, gradient, sums):
-    """Add to `sums` what one leaf contributes to queries `rows`, of which it owns the perturbed points `columns`."""
-    first, X, inverse_l, s2, factors, alpha, outputs, mean_variance, kernel = table
-    mean, variance, by_mean, by_variance = sums
-    m, d = inverse_l.shape[1:]
-    q, s = rows.size, columns.size
-    b = 1 if len(offsets) == 1 else q
-    queries, share = np.empty((q, d)), np.empty(s)
-    xi, tilt = np.empty((b, s, d)), np.empty((b, s, d))
-    for k in range(d):
-        for i in range(q):
-            queries[i, k] = Q[rows[i], k]
-        for i in range(b):
-            source = 0 if len(offsets) == 1 else rows[i]
-            for w in range(s):
-                xi[i, w, k] = offsets[source, columns[w], k]
-                tilt[i, w, k] = slopes[source, columns[w], k]
+def _parts(home, leaves):
+    """Return the parts of weighted sums that one leaf contributes: leaf, begins and ends of rows and of columns (p, 5).
+
+    home (q, s): the leaf that owns each perturbed point. Queries whose points all lie in one leaf make one part per
+    leaf, other queries one part for each leaf that they touch. Also returned are the rows and columns themselves.
+    """
+    q, s = home.shape
+    parts = np.empty((leaves + q * s, 5), np.int64)
+    rows, columns = np.empty(2 * q, np.int64), np.empty((q + 2) * s, np.int64)
+    count, row, column = 0, 0, s
     for w in range(s):
-        share[w] = weights[columns[w]]
-    n = first[leaf + 1] - first[leaf]
-    begin = 0
-    for other in range(leaf):
-        begin += m * (first[other + 1] - first[other]) ** 2
-    part = average(
-        queries,
-        xi,
-        tilt,
-        share,
-        X[first[leaf] : first[leaf + 1]],
-        inverse_l[leaf],
-        s2[leaf],
-        mean_variance,
-        kernel,
-        factors[begin : begin + m * n * n].reshape((m, n, n)),
-        alpha[m * first[leaf] : m * first[leaf + 1]].reshape((m, n)),
-        gradient,
-    )
-    shift, scale, square = outputs[leaf, 0] * share.sum(), outputs[leaf, 1], outputs[leaf, 2]
-    for j in range(m):
+        columns[w] = w
+    split = np.empty(q, np.bool_)
+    for i in range(q):
+        split[i] = False
+        for w in range(1, s):
+            if home[i, w] != home[i, 0]:
+                split[i] = True
+    for leaf in range(leaves):
+        begin = row
         for i in range(q):
-            mean[j, rows[i]] += shift + scale * part[0][j, i]
-            variance[j, rows[i]] += square * part[1][j, i]
-            if gradient:
-                for k in range(d):
-                    by_mean[j, rows[i], k] += scale * part[2][j, i, k]
-                    by_variance[j, rows[i], k] += square * part[3][j, i, k]
+            if not split[i] and home[i, 0] == leaf:
+                rows[row] = i
+                row += 1
+        if row > begin:
+            _put(parts, count, leaf, begin, row, 0, s)
+            count += 1
+    for i in range(q):
+        if not split[i]:
+            continue
+        rows[row] = i
+        row += 1
+        for w in range(s):
+            begin = column
+            for other in range(s):
+                if home[i, other] == home[i, w]:
+                    columns[column] = other
+                    column += 1
+            if columns[begin] == w:
+                _put(parts, count, home[i, w], row - 1, row, begin, column)
+                count += 1
+            else:  # this leaf has its part already
+                column = begin
+    return parts[:count], rows, columns
+
+
+@njit(cache=True)
+def _put(parts, count, leaf, row, rows, column, columns):
+    parts[count, 0], parts[count, 1], parts[count, 2] = leaf, row, rows
+    parts[count, 3], parts[count, 4] = column, columns
 
 
 @njit(cache=True)
@@ -112,38 +116,55 @@ def average_in_leaves(Q, offsets, slopes, weights, home, table, gradient):
     offsets, slopes (b, s, d) as in `prediction.average`; home (q, s): the leaf that owns each perturbed point; table: a
     `LeafTable`.
     """
-    q, s = home.shape
-    leaves, m, d = table[2].shape
-    sums = np.zeros((m, q)), np.zeros((m, q)), np.zeros((m, q, d)), np.zeros((m, q, d))
-    whole = np.ones(q, np.bool_)  # all of a query's points lie in one leaf
-    starts = np.zeros(leaves + 2, np.int64)
-    for i in range(q):
-        for w in range(1, s):
-            whole[i] &= home[i, w] == home[i, 0]
-        if whole[i]:
-            starts[home[i, 0] + 2] += 1
+    first, X, inverse_l, s2, factors, alpha, outputs, mean_variance, kernel = table
+    leaves, m, d = inverse_l.shape
+    total = len(Q)
+    mean, variance = np.zeros((m, total)), np.zeros((m, total))
+    by_mean, by_variance = np.zeros((m, total, d)), np.zeros((m, total, d))
+    begins = np.zeros(leaves + 1, np.int64)  # of the leaves' factors
     for leaf in range(leaves):
-        starts[leaf + 2] += starts[leaf + 1]
-    rows = np.empty(q, np.int64)  # the whole queries, those of a leaf together
-    for i in range(q):
-        if whole[i]:
-            rows[starts[home[i, 0] + 1]] = i
-            starts[home[i, 0] + 1] += 1
-    columns = np.arange(s)
-    for leaf in range(leaves):
-        if starts[leaf + 1] > starts[leaf]:
-            members = rows[starts[leaf] : starts[leaf + 1]]
-            _add_part(members, columns, leaf, Q, offsets, slopes, weights, table, gradient, sums)
-    for i in range(q):
-        if whole[i]:
-            continue
-        rows[0] = i
+        begins[leaf + 1] = begins[leaf] + m * (first[leaf + 1] - first[leaf]) ** 2
+    parts, all_rows, all_columns = _parts(home, leaves)
+    for p in range(len(parts)):
+        leaf = parts[p, 0]
+        rows, columns = all_rows[parts[p, 1] : parts[p, 2]], all_columns[parts[p, 3] : parts[p, 4]]
+        q, s, n = rows.size, columns.size, first[leaf + 1] - first[leaf]
+        b = 1 if len(offsets) == 1 else q
+        queries, share = np.empty((q, d)), np.empty(s)
+        xi, tilt = np.empty((b, s, d)), np.empty((b, s, d))
+        for k in range(d):
+            for i in range(q):
+                queries[i, k] = Q[rows[i], k]
+            for i in range(b):
+                source = 0 if len(offsets) == 1 else rows[i]
+                for w in range(s):
+                    xi[i, w, k] = offsets[source, columns[w], k]
+                    tilt[i, w, k] = slopes[source, columns[w], k]
+        owned = 0.0
         for w in range(s):
-            owned = 0
-            for other in range(s):
-                if home[i, other] == home[i, w]:
-                    columns[owned] = other
-                    owned += 1
-            if columns[0] == w:  # once a leaf
-                _add_part(rows[:1], columns[:owned], home[i, w], Q, offsets, slopes, weights, table, gradient, sums)
-    return sums
+            share[w] = weights[columns[w]]
+            owned += share[w]
+        shift, scale, square = owned * outputs[leaf, 0], outputs[leaf, 1], outputs[leaf, 2]
+        part = average(
+            queries,
+            xi,
+            tilt,
+            share,
+            X[first[leaf] : first[leaf + 1]],
+            inverse_l[leaf],
+            s2[leaf],
+            mean_variance,
+            kernel,
+            factors[begins[leaf] : begins[leaf + 1]].reshape((m, n, n)),
+            alpha[m * first[leaf] : m * first[leaf + 1]].reshape((m, n)),
+            gradient,
+        )
+        for j in range(m):
+            for i in range(q):
+                mean[j, rows[i]] += shift + scale * part[0][j, i]
+                variance[j, rows[i]] += square * part[1][j, i]
+                if gradient:
+                    for k in range(d):
+                        by_mean[j, rows[i], k] += scale * part[2][j, i, k]
+                        by_variance[j, rows[i], k] += square * part[3][j, i, k]
+    return mean, variance, by_mean, by_variance
