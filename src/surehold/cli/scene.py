@@ -122,8 +122,8 @@ def scene(
         files.write_file(folder / "scene.png", png)
     closed = sum(row[5] == "ok" for row in rows)
     console.print(
-        f"{len(rows)} modes, {closed} with a grasp that closes; the best is worth {best:.3f}. Picture by {drawn_by}. "
-        f"Page: {folder / 'scene.html'}",
+        f"{len(rows)} mode{'s' if len(rows) != 1 else ''}, {closed} with a grasp that closes; the best is worth "
+        f"{best:.3f}. Picture by {drawn_by}. Page: {folder / 'scene.html'}",
         markup=False,
         soft_wrap=True,
     )
