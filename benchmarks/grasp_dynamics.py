@@ -18,7 +18,6 @@ from surehold.optimization.threads import single_threaded
 from surehold.problems.grasp import Grasp
 
 DRAWN, CHECKED, BINS = 1500, 60, 5
-FACETS = {"drill": "front-left"}
 
 
 def sample(problem):
@@ -36,7 +35,7 @@ def sample(problem):
 
 def main(names):
     for name in names:
-        problem = Grasp(name, FACETS.get(name, "right-front"), variables=("dx", "dy", "dz"))
+        problem = Grasp(name, variables=("dx", "dy", "dz"))
         grasps, quality, kind = sample(problem)
         checker = GraspChecker(problem.simulator)
         start = time.process_time()

@@ -124,3 +124,12 @@ def test_the_thesis_preset_is_the_original_experiment():
     assert 0.1 < problem([-0.03, -0.7]) < 1.0
     with pytest.raises(InputError, match="preset 'theses' is unknown"):
         Grasp("bottle", preset="theses")
+
+
+def test_the_default_facet_of_the_drill_has_a_grasp_that_holds():
+    drill = Grasp("drill")
+    assert (Grasp("mug").facet, drill.facet) == ("right-front", "bottom-front")
+    best = np.array([-0.018, -0.036])
+    around = [drill(best + step) for step in 0.003 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])]
+    assert drill(best) > 0.1
+    assert min(around) > 0.1

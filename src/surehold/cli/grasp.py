@@ -45,8 +45,13 @@ __all__ = ["grasp"]
 def grasp(
     obj: ObjectName,
     facet: Annotated[
-        str, typer.Option(help="The facet that the palm faces, then the one at the thumb.")
-    ] = "right-front",
+        str,
+        typer.Option(
+            help="The facet that the palm faces, then the one at the thumb; by default right-front, of the drill "
+            "bottom-front.",
+            show_default=False,
+        ),
+    ] = "",
     variables: Annotated[str, typer.Option(help="Free variables, of dx,dy,dz,rx,ry,rz,s1.")] = "dx,dy",
     contact: Annotated[str, typer.Option(help="single, patch or graded (soft touch).")] = "graded",
     quality: Annotated[str, typer.Option(help="epsilon, signed_epsilon, volume, simox, task or closure.")] = "epsilon",
@@ -116,12 +121,13 @@ def grasp(
             preset="thesis" if preset == "thesis" else "",
             progress=progress,
         )
+    described["facet"] = problem.facet
     checker = None
     if check:
         from surehold.grasping.dynamics import GraspChecker
 
         checker = GraspChecker(problem.simulator)  # before the run: without MuJoCo it says so at once
-    folder = folder_for(f"{problem.object.name} {facet}", method, seed, out, study)
+    folder = folder_for(f"{problem.object.name} {problem.facet}", method, seed, out, study)
 
     def describe(candidate: Candidate) -> Candidate:
         outcome = problem.grasp(candidate.x)
@@ -149,7 +155,7 @@ def grasp(
 
     run_session(
         problem,
-        title=f"Grasp the {problem.object.name} from the {facet}",
+        title=f"Grasp the {problem.object.name} from the {problem.facet}",
         method=method,
         noise=input_noise,
         trials=100 if trials is None else trials,
@@ -160,7 +166,7 @@ def grasp(
         open_report=open_report,
         settings={
             "object": problem.object.name,
-            "facet": facet,
+            "facet": problem.facet,
             "variables": ", ".join(problem.box.names),
             "hand": problem.simulator.hand.name,
             "preshape": problem.simulator.preshape,

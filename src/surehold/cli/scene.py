@@ -54,6 +54,7 @@ def scene(
     from surehold.grasping.formats import grasp_to_dict
     from surehold.grasping.meshes import OBJECTS
     from surehold.problems.grasp import Grasp
+    from surehold.problems.grasp_defaults import default_facet
     from surehold.reports import files, gather
     from surehold.reports.run_report import Candidate
     from surehold.reports.scenes_page import render_scenes
@@ -62,14 +63,15 @@ def scene(
     console = terminal()
     gripper = hand_of(hand, hand_config)
     quick = hand == "icub-left" and not preshape and (not obj or obj in OBJECTS)
-    modes = _modes(facet or ("all" if quick else "right-front"))
+    if facet:
+        _modes(facet)  # explains an unknown one at once
     folder = files.checked_folder(out or Path("runs") / f"scene-{Path(obj).stem or 'objects'}")
     views, notes, rows, data = [], [], [], []
     best = -np.inf
     picture = None
     for name in [obj] if obj else OBJECTS:
         body = object_of(name, unit, mass, frame, console)
-        for mode in modes:
+        for mode in _modes(facet or ("all" if quick else default_facet(body))):
             with announced(console), shown_progress(f"{body.name}, {mode}", console) as progress:
                 problem = Grasp(
                     body,

@@ -55,8 +55,9 @@ class Optimizer:
         How far the reached input strays from the commanded one; None for inputs that are reached exactly.
     surrogate
         "gp" (default), "tgp" (a treed Gaussian process, for functions that are smooth here and rough there),
-        "local_global" (rough around a center that is learnt, smooth elsewhere; no observation noise), or an object
-        with the method `condition` (see `surrogate.Surrogate`).
+        "local_global" (rough around a center that is learnt, smooth elsewhere; the fewest trials where little of the
+        box matters, at three times the time; no observation noise), or an object with the method `condition` (see
+        `surrogate.Surrogate`).
     criterion
         "ei", "log_ei", "pi", "ucb"; with input noise also "uei", "ulog_ei", "upi", "uucb" (the criterion averaged over
         sigma points) and "robust_ei", ... (the criterion of the averaged outcome); "thompson" and "robust_thompson"

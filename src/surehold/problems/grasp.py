@@ -24,7 +24,7 @@ from surehold.grasping.meshes import GraspObject, shipped_object
 from surehold.grasping.poses import Pose, default_pose, facet_axes
 from surehold.grasping.synergy import preshape_of
 from surehold.optimization.box import Box
-from surehold.problems.grasp_defaults import GraspDefault, grasp_default
+from surehold.problems.grasp_defaults import GraspDefault, default_facet, grasp_default
 from surehold.problems.problem import checked_points
 
 __all__ = ["VARIABLES", "Grasp"]
@@ -50,7 +50,7 @@ class Grasp:
         Name of a shipped object ("mug", "bottle", "glass", "drill") or a `GraspObject`.
     facet
         One of the 24 modes, "facet-thumb": the facet of the object's box that the palm faces, then the neighboring
-        facet against which the thumb comes to press, such as "right-front".
+        facet against which the thumb comes to press. By default "right-front", for the drill "bottom-front".
     variables
         Names of the free variables, a subset of `VARIABLES`; their order is the order of the coordinates.
     contact, quality, closing, friction, torsion, cones, task, collision, hand, preshape
@@ -82,7 +82,7 @@ class Grasp:
     def __init__(
         self,
         obj: str | GraspObject = "mug",
-        facet: str = "right-front",
+        facet: str = "",
         variables: Sequence[str] = ("dx", "dy"),
         *,
         contact: str = "graded",
@@ -114,8 +114,9 @@ class Grasp:
                 raise InputError(f"'{name}' is both free and fixed; take it out of one of the two.")
             if not np.isfinite(value):
                 raise InputError(f"'{name}' is fixed at {value!r}; give a finite number in {VARIABLES[name]}.")
-        axes = facet_axes(facet)
         body = shipped_object(obj) if isinstance(obj, str) else obj
+        facet = facet or default_facet(body)
+        axes = facet_axes(facet)
         self.object: Final[GraspObject] = body
         self.facet: Final[str] = facet
         self.name: Final[str] = f"{body.name}, {facet}"

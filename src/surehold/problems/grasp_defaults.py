@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from surehold.grasping.distance_field import cache_folder, content_hash
 from surehold.grasping.grasp import Simulator
-from surehold.grasping.meshes import OBJECTS
+from surehold.grasping.meshes import OBJECTS, GraspObject
 from surehold.grasping.poses import MODES, Pose, default_pose, facet_axes
 from surehold.grasping.synergy import closing_motion, preshape_of
 
-__all__ = ["GraspDefault", "grasp_default", "search_default"]
+__all__ = ["GraspDefault", "default_facet", "grasp_default", "search_default"]
 
 
 class GraspDefault(NamedTuple):
@@ -164,6 +164,14 @@ def grasp_default(
             scratch.write_text(json.dumps(known))
             scratch.replace(path)
     return known
+
+
+def default_facet(obj: GraspObject) -> str:
+    """Return the mode in which an object is grasped where none is asked for.
+
+    The drill is held at its grip and battery: from the side no grasp is found that holds when the hand is off.
+    """
+    return "bottom-front" if obj.solids and obj.name == "drill" else "right-front"
 
 
 def _load(path: Path) -> GraspDefault | None:
