@@ -42,7 +42,7 @@ def main(names):
         checks = checker.checks(grasps)
         seconds = (time.process_time() - start) / len(checks)
         held = np.array([check.verdict == "held" for check in checks])
-        rank = spearmanr(quality, held).statistic
+        rank = spearmanr(quality, held).statistic if len(set(held)) > 1 else np.nan
         print(f"{name}: {len(checks)} grasps, rank correlation {rank:.2f}, {seconds:.2f} s each")
         for k in range(-1, BINS):
             mine = kind == k

@@ -28,6 +28,8 @@ def line(problem, share):
 
 
 def measures(quality):
+    if not np.any(quality > 0.0):
+        return np.nan, np.nan, 0  # no grasp closes on this line
     mean = quality[quality > 0.0].mean()
     step = np.abs(np.diff(quality)) / mean
     bend = np.abs(quality[:-2] - 2.0 * quality[1:-1] + quality[2:]) / 2.0 / mean
