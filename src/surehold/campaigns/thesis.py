@@ -143,7 +143,8 @@ OPEN_PLACES: Final = (
     OpenPlace(
         "Bias of the expected improvement",
         "ξ = 0.01, scaled by the signal's size.",
-        "As the program has it: 0.0025 for RKHS, 0.025 for GF, 0.0156 for GM, none elsewhere.",
+        "Divided by the signal parameter, as in the program: 0.0025 for RKHS, 0.025 for GF, 0.156 for GM in Table 4.1, "
+        "none elsewhere. On GM that is more than the function's whole range (plan `table-4.1-printed`).",
     ),
     OpenPlace(
         "Free parameter of the unscented transformation",

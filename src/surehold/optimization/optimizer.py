@@ -98,8 +98,8 @@ class Optimizer:
         Whether the next trial is sought in a box around the best one that grows with success and shrinks without
         (after TuRBO): an option for six variables and more; off by default.
     preset
-        "thesis", or "thesis-rkhs", "thesis-gf", "thesis-gm", "thesis-gm-noise", "thesis-grasp": the settings of the
-        thesis, with the constants that it chose by hand for that problem.
+        "thesis", or "thesis-rkhs", "thesis-gf", "thesis-gm", "thesis-gm-printed", "thesis-gm-noise", "thesis-grasp":
+        the settings of the thesis, with the constants that it chose by hand for that problem.
     lattice
         Which points can be tried, where not all of the box can; see `lattice.Lattice`.
 

@@ -65,7 +65,7 @@ class Thesis(NamedTuple):
     ratio: float = 1e-6
     """[sigma_n], nugget as a fraction of the signal variance"""
     margin: float = 0.0
-    """[xi] as the original program used it"""
+    """[xi], 0.01 / sigma_p as the original program divided it"""
     min_leaf: int = 20
     """[s_l], smallest number of samples in a leaf of the tree"""
 
@@ -83,8 +83,9 @@ class Thesis(NamedTuple):
 THESIS: Final = {
     "thesis": Thesis(),
     "thesis-rkhs": Thesis(3.93, 1e-6, 0.0025, 8),
-    "thesis-gf": Thesis(0.40, 1e-6, 0.025, 15),  # 0.01 / 0.40; 0.05 belongs to the printed 0.2
-    "thesis-gm": Thesis(0.0642, 1e-6, 0.0156, 15),
+    "thesis-gf": Thesis(0.40, 1e-6, 0.025, 15),
+    "thesis-gm": Thesis(0.0642, 1e-6, 0.1558, 15),
+    "thesis-gm-printed": Thesis(0.642, 1e-6, 0.0156, 15),
     "thesis-gm-noise": Thesis(0.642, 1e-6, 0.0, 15),
     "thesis-grasp": Thesis(0.35, 1e-4, 0.0, 20),
 }
