@@ -6,8 +6,10 @@ Legend
     size    of a rectangle: the length of its longest side
 
 Jones, Perttunen and Stuckman 1993, in the locally biased form of Gablonsky and Kelley 2001: size is the longest side,
-and of the rectangles of one size only the best is divided. SciPy's routine asks for one value at a time; here one call
-of the objective serves all rectangles divided in a round, in all regions.
+and of the rectangles of one size only the best is divided. As NLopt's GN_DIRECT_L, with the tolerances that the thesis'
+program gave it: no least gain is asked of a divided rectangle, and a round that raises the highest value by next to
+nothing is the last. Libraries' routines ask for one value at a time; here one call of the objective serves all
+rectangles divided in a round, in all regions.
 """
 
 from collections.abc import Callable
@@ -20,7 +22,7 @@ from numpy.typing import NDArray
 __all__ = ["divide_rectangles"]
 
 _DEEPEST: Final = 40  # levels of a side; 3^-40 is beyond double precision
-_WORTHWHILE: Final = 1e-4  # Jones' epsilon: least relative gain that a divided rectangle must promise
+_TOLERANCE: Final = 1e-12  # a gain below this, or below this share of the value, ends a search
 _LOWEST: Final = -1e300  # stands for values that are not finite
 
 
@@ -40,10 +42,8 @@ def _chosen(sizes, values, count, best_of, chosen):
     """
     for level in range(best_of.size):
         best_of[level] = -1
-    top = -np.inf
     for i in range(count):
         level = sizes[i]
-        top = max(top, values[i])
         if level < best_of.size and (best_of[level] < 0 or values[i] > values[best_of[level]]):
             best_of[level] = i
     found = 0
@@ -62,15 +62,13 @@ def _chosen(sizes, values, count, best_of, chosen):
                 slope_down = max(slope_down, slope)
         if slope_down > slope_up:
             continue
-        if slope_up < np.inf and value + slope_up * size < top + _WORTHWHILE * abs(top):
-            continue
         chosen[found] = best_of[a]
         found += 1
     return found
 
 
 @njit(cache=True)
-def _propose(centers, levels, sizes, values, counts, budget, best_of, chosen, points, owners):
+def _propose(centers, levels, sizes, values, counts, budgets, best_of, chosen, points, owners):
     """Fill points (k, d) with both children along every longest side of the chosen rectangles of every region.
 
     owners (k, 3): region, parent and side of each. Returns the number of points.
@@ -79,7 +77,9 @@ def _propose(centers, levels, sizes, values, counts, budget, best_of, chosen, po
     total = 0
     for r in range(counts.size):
         count = counts[r]
-        left = budget - count
+        left = budgets[r] - count
+        if left < 2:
+            continue
         for c in range(_chosen(sizes[r], values[r], count, best_of, chosen)):
             parent = chosen[c]
             shortest = sizes[r, parent]
@@ -139,7 +139,11 @@ def divide_rectangles(
     upper: NDArray[np.float64],
     evaluations: int,
 ) -> NDArray[np.float64]:
-    """Return the highest point found in each box [lower, upper] (r, d), with up to `evaluations` evaluations each."""
+    """Return the highest point found in each box [lower, upper] (r, d), with up to `evaluations` evaluations each.
+
+    A search ends early with the round, the first one excepted, that raises its highest value by less than 1e-12, or by
+    less than 1e-12 of it. Where the objective is as small as that everywhere, the point is close to the center.
+    """
     regions, d = lower.shape
     width = upper - lower
     centers = np.full((regions, evaluations, d), 0.5)
@@ -150,16 +154,23 @@ def divide_rectangles(
     best_of, chosen = np.empty(_DEEPEST, dtype=np.int64), np.empty(_DEEPEST, dtype=np.int64)
     points = np.empty((2 * d * _DEEPEST * regions, d))
     owners = np.empty((len(points), 3), dtype=np.int64)
+    budgets = np.full(regions, evaluations)
     values[:, 0] = _finite(objective(lower + 0.5 * width))
+    best, first = values[:, 0].copy(), True
     while True:
-        total = _propose(centers, levels, sizes, values, counts, evaluations, best_of, chosen, points, owners)
+        total = _propose(centers, levels, sizes, values, counts, budgets, best_of, chosen, points, owners)
         if total == 0:
             break
         home = owners[:total, 0]
         found = _finite(objective(lower[home] + width[home] * points[:total]))
         _divide(centers, levels, sizes, values, counts, points, owners, found, total)
-    best = values.argmax(axis=1)
-    return lower + width * centers[np.arange(regions), best]
+        raised = values.max(axis=1)
+        gain = raised - best
+        negligible = _TOLERANCE * np.maximum(1.0, 0.5 * (np.abs(raised) + np.abs(best)))
+        if not first:
+            budgets[(gain > 0.0) & (gain < negligible)] = 0
+        best, first = raised, False
+    return lower + width * centers[np.arange(regions), values.argmax(axis=1)]
 
 
 def _finite(values: NDArray[np.float64]) -> NDArray[np.float64]:
