@@ -1,5 +1,6 @@
 """surehold's surrogates as scikit-learn estimators (needs scikit-learn: `pip install surehold[sklearn]`)."""
 
+from abc import abstractmethod
 from math import inf
 from typing import Any, Literal, cast
 
@@ -29,8 +30,8 @@ class _CubeRegressor(RegressorMixin, BaseEstimator):
     random_state: Any
     process_: GaussianProcess | TreedGaussianProcess
 
-    def _surrogate(self) -> GaussianProcess | TreedGaussianProcess:
-        raise NotImplementedError
+    @abstractmethod
+    def _surrogate(self) -> GaussianProcess | TreedGaussianProcess: ...
 
     def fit(self, X: Any, y: Any):
         """Fit to X (n, d) and y (n,); returns itself. Raises ValueError for data or settings out of range."""
