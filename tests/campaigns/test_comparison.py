@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
+from statsmodels.stats.power import TTestPower
 
 from surehold.campaigns.comparison import claim_results, comparisons, final_values, rows_of, traces
 from surehold.campaigns.costs import cost_table, total_cost_table
@@ -147,6 +148,25 @@ def test_claims_that_are_not_shown_come_with_what_is_seen():
     few = {key: values[:5] for key, values in results.items()}
     told = claim_results({"table-4.1": records_of("table-4.1", 100, few)})
     assert next(t.verdict for t in told if t.result) == "too few runs"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_differences_that_are_not_shown_stand_beside_the_printed_ones(sign):
+    base, gains = drawn(0.42, 0.1, 30), drawn(0.02, 0.1, 30, 5)
+    other = [b + sign * g for b, g in zip(base, gains, strict=True)]
+    results = {("glass", "BO"): base, ("glass", "UBO"): other}
+    told = claim_results({"table-4.4-grasps": records_of("table-4.4-grasps", 30, results, "mean")})
+    (mean,) = [t for t in told if t.result]
+    printed, seen = mean.reason.split("; ")
+    assert mean.verdict == "not shown"
+    assert printed == f"printed is a difference of 0.031, {0.031 / (0.1 / 30**0.5):.1f} of our standard errors"
+    if sign < 0.0:
+        assert seen == "ours has the other sign"
+    else:
+        needed = TTestPower().solve_power(effect_size=0.2, alpha=0.05, power=0.8)
+        assert int(seen.removeprefix("about ").removesuffix(" seeds would show ours")) == pytest.approx(
+            needed, rel=0.02
+        )
 
 
 def test_curves_are_means_with_bands_and_the_first_split():

@@ -113,7 +113,7 @@ def _curve_panel(records: Records, problem: str, measure: str, band: float) -> P
 
 def _result_table(records: Records, rows: list[Row]) -> Table:
     exhibit = exhibit_of(records.header["plan"])
-    head = ["problem", "method", "runs", "mean ± se", "median", "95 % bootstrap", "CPU s a run", "an ask"]
+    head = ["problem", "method", "runs", "mean ± se", "median", "95 % bootstrap", "CPU s a run", "CPU s an ask"]
     several = len({row.measure for row in rows}) > 1
     if several:
         head.insert(2, "measure")
