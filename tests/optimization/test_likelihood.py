@@ -130,7 +130,7 @@ def test_density_is_zero_where_nothing_can_be_computed(data):
     assert log_posterior(np.array([np.nan, 0.0]), evidence_of(X, y)) == -np.inf
 
 
-@pytest.mark.parametrize("n", [1, 2, 30, 191, 192, 193, 288, 400, 700])
+@pytest.mark.parametrize("n", [*range(1, 12), 30, 193, 700])
 def test_cholesky_is_that_of_lapack(n):
     rng = np.random.default_rng(n)
     B = rng.standard_normal((n, n))

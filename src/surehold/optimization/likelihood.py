@@ -37,7 +37,6 @@ __all__ = [
 
 _LOG_2PI: Final = log(2.0 * pi)
 _LARGEST: Final = 60.0  # |theta| beyond this is outside every useful scale and would overflow
-_PANEL: Final = 96  # columns a panel of the blocked factorization; below twice this, plain loops are as fast as LAPACK
 
 
 class Evidence(NamedTuple):
@@ -101,50 +100,68 @@ EVIDENCE_TYPE: Final = types.NamedTuple(
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _cholesky_block(A, start, stop):
-    for j in range(start, stop):
-        t = 0.0
-        for k in range(start, j):
-            t += A[j, k] * A[j, k]
-        pivot = A[j, j] - t
+def cholesky(A):
+    """Overwrite the lower triangle of A (n, n) with its Cholesky factor; False if A is not positive definite.
+
+    Two columns at a time and four rows below them together: six loads from memory serve eight sums, where entry by
+    entry every sum would read both of its rows anew.
+    """
+    n = A.shape[0]
+    for j in range(0, n - 1, 2):
+        u, v = A[j], A[j + 1]
+        uu = uv = vv = 0.0
+        for k in range(j):
+            uu += u[k] * u[k]
+            uv += u[k] * v[k]
+            vv += v[k] * v[k]
+        pivot = u[j] - uu
         if not pivot > 0.0:
             return False
-        A[j, j] = sqrt(pivot)
-        inverse = 1.0 / A[j, j]
-        for i in range(j + 1, stop):
-            t = 0.0
-            for k in range(start, j):
-                t += A[i, k] * A[j, k]
-            A[i, j] = (A[i, j] - t) * inverse
-    return True
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def cholesky(A):
-    """Overwrite the lower triangle of A (n, n) with its Cholesky factor; False if A is not positive definite."""
-    n = A.shape[0]
-    if n <= 2 * _PANEL:
-        return _cholesky_block(A, 0, n)
-    for start in range(0, n, _PANEL):
-        stop = min(start + _PANEL, n)
-        if not _cholesky_block(A, start, stop):
+        u[j] = sqrt(pivot)
+        first = 1.0 / u[j]
+        v[j] = (v[j] - uv) * first
+        between = v[j]
+        pivot = v[j + 1] - vv - between * between
+        if not pivot > 0.0:
             return False
-        for i in range(stop, n):
-            for j in range(start, stop):
-                t = 0.0
-                for k in range(start, j):
-                    t += A[i, k] * A[j, k]
-                A[i, j] = (A[i, j] - t) / A[j, j]
-        below = np.empty((n - stop, stop - start))
-        for i in range(stop, n):
-            for j in range(start, stop):
-                below[i - stop, j - start] = A[i, j]
-        for first in range(stop, n, 4 * _PANEL):  # row slabs: only the lower triangle is updated, by matrix products
-            last = min(first + 4 * _PANEL, n)
-            product = np.dot(below[first - stop : last - stop], below[: last - stop].T)
-            for i in range(first, last):
-                for j in range(stop, i + 1):
-                    A[i, j] -= product[i - first, j - stop]
+        v[j + 1] = sqrt(pivot)
+        second = 1.0 / v[j + 1]
+        i = j + 2
+        while i + 4 <= n:
+            a, b, c, d = A[i], A[i + 1], A[i + 2], A[i + 3]
+            au = bu = cu = du = av = bv = cv = dv = 0.0
+            for k in range(j):
+                au += a[k] * u[k]
+                bu += b[k] * u[k]
+                cu += c[k] * u[k]
+                du += d[k] * u[k]
+                av += a[k] * v[k]
+                bv += b[k] * v[k]
+                cv += c[k] * v[k]
+                dv += d[k] * v[k]
+            a[j], b[j], c[j], d[j] = (a[j] - au) * first, (b[j] - bu) * first, (c[j] - cu) * first, (d[j] - du) * first
+            a[j + 1] = (a[j + 1] - av - a[j] * between) * second
+            b[j + 1] = (b[j + 1] - bv - b[j] * between) * second
+            c[j + 1] = (c[j + 1] - cv - c[j] * between) * second
+            d[j + 1] = (d[j + 1] - dv - d[j] * between) * second
+            i += 4
+        for row in range(i, n):
+            a = A[row]
+            au = av = 0.0
+            for k in range(j):
+                au += a[k] * u[k]
+                av += a[k] * v[k]
+            a[j] = (a[j] - au) * first
+            a[j + 1] = (a[j + 1] - av - a[j] * between) * second
+    if n % 2 == 1:
+        last = A[n - 1]
+        total = 0.0
+        for k in range(n - 1):
+            total += last[k] * last[k]
+        pivot = last[n - 1] - total
+        if not pivot > 0.0:
+            return False
+        last[n - 1] = sqrt(pivot)
     return True
 
 
