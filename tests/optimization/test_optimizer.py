@@ -9,7 +9,6 @@ from surehold.optimization.hyperparameters import Learning
 from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.presets import THESIS
-from surehold.problems import RKHS
 
 BOX = Box({"a": (-1.0, 3.0), "b": (0.0, 10.0)})
 NOISE = InputNoise.unit(0.05)
