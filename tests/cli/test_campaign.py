@@ -65,8 +65,26 @@ def test_failures_are_told(here, capsys):
     (here / "cheap.yaml").write_text(
         PLAN.replace("function: gf", "function: 'own.py:fails', arguments: {bounds: 'x=0:1'}")
     )
-    assert surehold("campaign run cheap.yaml --runs 1") == 0
+    assert surehold("campaign run cheap.yaml --runs 1") == 1
     assert "2 runs failed; the first: random on hill, seed 0" in plain(capsys)
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "message"),
+    [
+        ("own.py:ful", "bounds: 'x=0:1'", "did you mean 'fun'"),
+        ("own.py:fun", "bounds: 'x=1:0'", "problem 'hill'"),
+        ("grasp", "facet: lefft", "facet 'lefft' is unknown"),
+    ],
+)
+def test_a_problem_that_cannot_be_built_is_refused_before_any_run(here, capsys, function, arguments, message):
+    (here / "own.py").write_text("def fun(x):\n    return x[0]\n")
+    (here / "cheap.yaml").write_text(
+        PLAN.replace("function: gf", f"function: '{function}', arguments: {{{arguments}}}")
+    )
+    assert surehold("campaign run cheap.yaml") == 2
+    assert message in plain(capsys)
+    assert not (here / "runs").exists()
 
 
 def test_list_shows_every_plan(capsys):

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from surehold.campaigns.methods import checked_method
 from surehold.campaigns.plan import Plan, Task
+from surehold.campaigns.problem_setup import build_problem
 from surehold.campaigns.single_run import run_once
 from surehold.campaigns.table import Records, opened
 from surehold.errors import InputError, SureholdError, unknown_name
@@ -89,7 +90,8 @@ def run_campaign(
     Raises
     ------
     InputError
-        For bad arguments and settings; for tables that another process writes or another version or plan has written.
+        For bad arguments, settings and problems, before anything is run; for tables that another process writes or
+        another version or plan has written.
     SureholdError
         If the table cannot be written, or a worker process dies.
     """
@@ -97,7 +99,13 @@ def run_campaign(
         raise InputError(f"workers is {workers!r}; give a whole number of 1 or more.")
     kind, _ = checked_backend(backend)
     tasks = plan.tasks(runs, shard, only)
-    for cell in plan.cells(only):
+    cells = plan.cells(only)
+    for label, on in {cell.problem: cell.on for cell in cells}.items():
+        try:
+            build_problem(on)  # also leaves what is kept on disk, so that workers do not make it side by side
+        except InputError as error:
+            raise InputError(f"problem '{label}': {error}") from None
+    for cell in cells:
         checked_method(cell)
     with opened(folder, plan, shard) as table:
         records = table.records

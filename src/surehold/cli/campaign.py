@@ -38,7 +38,10 @@ def run(
     only: Only = "",
     retry: Annotated[bool, typer.Option("--retry", help="Make runs again that failed.")] = False,
 ) -> None:
-    """Make the runs of a plan that its table does not hold yet; Ctrl-C keeps what is finished."""
+    """Make the runs of a plan that its table does not hold yet; Ctrl-C keeps what is finished.
+
+    Exit code 1: some of its runs failed.
+    """
     from surehold.campaigns.plan import share_of
     from surehold.campaigns.plan_file import load_plan
     from surehold.campaigns.runner import run_campaign
@@ -72,9 +75,11 @@ def run(
     for note in records.notes:
         console.print(f"Note: {note}", markup=False, soft_wrap=True)
     if records.failed:
-        key, row = next(iter(records.failed.items()))
+        (problem, method, seed), row = next(iter(records.failed.items()))
+        reason = row["error"].rstrip(".")
         console.print(
-            f"{len(records.failed)} runs failed; the first: {key[1]} on {key[0]}, seed {key[2]}: {row['error']}",
+            f"{len(records.failed)} runs failed; the first: {method} on {problem}, seed {seed}: {reason}. "
+            "Make them again with --retry.",
             markup=False,
             soft_wrap=True,
         )
@@ -83,6 +88,8 @@ def run(
         markup=False,
         soft_wrap=True,
     )
+    if records.failed:
+        raise typer.Exit(1)
 
 
 def report(
