@@ -139,14 +139,12 @@ class Goal:
             improvement = RiskImprovement(posterior, self.accurate, self.risk, float(best), rng)
             found = maximizer.multistart(improvement, improvement, d, anchors, rng, regions)
             return np.concatenate([self._looks(posterior, found[0]), found])
-        if self.criterion.scale == "exact":
-            margin = self.margin
-            polish = (len(tried) + len(failed)) % _POLISH == 0 and not len(pending)
-            if not (self.thesis or self.noisy or polish):
-                margin = _WORTHWHILE * _spread(observed)
-            reached = (Perturbations(exact(d)),) * 2
-        else:
-            margin, reached = self.margin, (self.accurate, self.coarse)
+        margin = self.margin
+        polish = (len(tried) + len(failed)) % _POLISH == 0 and not len(pending)
+        if not (self.thesis or self.noisy or polish):
+            margin = _WORTHWHILE * _spread(observed)
+        exactly = self.criterion.scale == "exact"
+        reached = (Perturbations(exact(d)),) * 2 if exactly else (self.accurate, self.coarse)
         accurate = self._acquisition(posterior, reached[0], best, margin)
         if self.thesis:
             return maximizer.direct(accurate, d, anchors[0], rng, regions)
