@@ -236,6 +236,8 @@ def _beside_the_printed(records: Records, claim: Claim, difference: Paired, word
         parts.append(
             f"printed is a difference of {number(gap, 2)}, {abs(gap) / difference.se:.1f} of our standard errors"
         )
+        own = sum(second.values()) / len(second)
+        parts.append(f"{claim.than} alone ends with {number(own, 2)} here, {number(printed[1].mean, 2)} in print")
     if word == "not shown":
         if (difference.mean > 0.0) == (claim.measure in LOWER):
             parts.append("ours has the other sign")
