@@ -140,12 +140,10 @@ def _result_table(records: Records, rows: list[Row]) -> Table:
             shown = "–" if theirs is None else f"{theirs.mean:g}"
             if theirs is not None and theirs.pm is not None:
                 shown += f" ± {theirs.pm:g}"
-            unfinished = row.ours is None or row.ours.n < row.planned
-            verdict = row.verdict + (" (unfinished)" if unfinished and row.verdict else "")
             cells += [
                 shown,
                 "–" if math.isnan(row.p) else _p(row.p),
-                verdict or ("no runs" if row.ours is None else "–"),
+                row.verdict or ("no runs" if row.ours is None else "–"),
             ]
         body.append(tuple(cells))
         marks.append(_MARKS[row.verdict] if exhibit is not None else "")
