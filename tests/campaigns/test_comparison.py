@@ -170,6 +170,14 @@ def test_differences_that_are_not_shown_stand_beside_the_printed_ones(sign):
         )
 
 
+def test_grasps_have_no_known_maximum_to_be_near_to():
+    results = {("glass side", "GP"): drawn(0.45, 0.1, 30), ("glass side", "TGP-winf"): drawn(0.45, 0.1, 30, 5)}
+    told = claim_results({"table-4.2": records_of("table-4.2", 30, results)})
+    (only,) = [t for t in told if t.result]
+    assert only.verdict == "not shown"
+    assert "printed is a difference of 0.0058" in only.reason
+
+
 def test_curves_are_means_with_bands_and_the_first_split():
     results = {("RKHS", "GP"): drawn(5.0, 0.5, 25), ("RKHS", "TGP-winf"): drawn(5.5, 0.5, 25)}
     records = records_of("table-4.1", 100, results)

@@ -13,7 +13,7 @@ from surehold.campaigns.single_run import expanded
 from surehold.campaigns.statistics import LEVEL, Paired, Summary, holm, p_against, paired, summary
 from surehold.campaigns.table import Records
 from surehold.campaigns.thesis import CLAIMS, Claim, exhibit_of
-from surehold.problems.synthetic import synthetic_function
+from surehold.problems.synthetic import SYNTHETIC, synthetic_function
 from surehold.reports.verdict import number
 
 __all__ = ["ClaimResult", "Comparison", "Row", "claim_results", "comparisons", "final_values", "measures_of", "rows_of"]
@@ -207,13 +207,13 @@ def _claim_word(claim: Claim, difference: Paired | None, p: float) -> str:
 def _reason(records: Records | None, claim: Claim, difference: Paired | None, word: str) -> str:
     if records is None or difference is None or word not in ("not shown", "contradicted"):
         return ""
-    if claim.measure == "best":
-        return _near_the_maximum(records, claim)
+    function = next(cell["function"] for cell in records.header["cells"] if cell["problem"] == claim.problem)
+    if claim.measure == "best" and function in SYNTHETIC:
+        return _near_the_maximum(records, claim, function)
     return _beside_the_printed(records, claim, difference, word)
 
 
-def _near_the_maximum(records: Records, claim: Claim) -> str:
-    function = next(cell["function"] for cell in records.header["cells"] if cell["problem"] == claim.problem)
+def _near_the_maximum(records: Records, claim: Claim, function: str) -> str:
     enough = 0.99 * synthetic_function(function).optimum.value
     counts = []
     for method in (claim.than, claim.better):

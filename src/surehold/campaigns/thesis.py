@@ -82,6 +82,11 @@ def _claims() -> tuple[Claim, ...]:
     for k in ("1", "2", "3", "inf"):
         text = f"BO-TGP (w{k}) shows no significant gain on GF"
         claims.append(Claim(text, "table-4.1", "GF", f"TGP-w{k}", "GP", "best", "no better"))
+    for problem in ("bottle side", "bottle top", "mug side", "glass side"):  # "generally", and "aside from the drill"
+        text = f"BO-TGP (winf) finds higher values than BO-GP on {problem}"
+        claims.append(Claim(text, "table-4.2", problem, "TGP-winf", "GP", "best", "better"))
+    text = "BO-TGP (winf) finds no higher values than BO-GP on drill side"
+    claims.append(Claim(text, "table-4.2", "drill side", "TGP-winf", "GP", "best", "no better"))
     for k in ("1", "2", "3", "inf"):
         expected = "better" if k == "3" else "no better"
         word = "better" if k == "3" else "no better"
