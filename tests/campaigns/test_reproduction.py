@@ -25,7 +25,12 @@ def test_packing_and_writing(tmp_path, monkeypatch, cheap):
     reproduction.main(["--pack"])
     text = (tmp_path / "docs/reproduction.md").read_text()
     assert "8 of 16 planned runs" in text
-    assert "BO on hill: 2; UBO on hill: 2; BO on flat: 2; UBO on flat: 2" in text, "unfinished cells are not shown"
+    assert "| 4 | 2: all |" in text, "unfinished cells are not shown"
+    run_campaign(cheap, tmp_path / "results/cheap", runs=3, only=["hill", "UBO"])
+    run_campaign(cheap, tmp_path / "results/cheap", runs=3, only=["flat"])
+    run_campaign(cheap, tmp_path / "results/cheap", only=["flat", "BO"])
+    text = reproduction_text(tmp_path / "results")
+    assert "| 4 | 2: BO on hill; 3: UBO on hill and flat |" in text
     run_campaign(cheap, tmp_path / "results/cheap")  # continues from the packed table
     assert len(read_folder(tmp_path / "results/cheap").rows) == 16
     reproduction.main(["--pack"])

@@ -61,17 +61,29 @@ def _unfinished(campaigns: dict[str, Records]) -> Table:
     rows = []
     for plan, records in campaigns.items():
         planned = records.header["runs"]
-        made: dict[tuple[str, str], int] = {}
+        cells = [(cell["problem"], cell["method"]) for cell in records.header["cells"]]
+        made = dict.fromkeys(cells, 0)
         for problem, method, _ in records.done:
-            made[problem, method] = made.get((problem, method), 0) + 1
-        short = [
-            f"{cell['method']} on {cell['problem']}: {made.get((cell['problem'], cell['method']), 0)}"
-            for cell in records.header["cells"]
-            if made.get((cell["problem"], cell["method"]), 0) < planned
-        ]
+            if (problem, method) in made:
+                made[problem, method] += 1
+        short = [f"{n}: {_named(made, n)}" for n in sorted(set(made.values())) if n < planned]
         if short:
             rows.append((f"`{plan}`", str(planned), "; ".join(short)))
     return Table("unfinished", "", ("plan", "runs planned", "runs made where fewer"), tuple(rows))
+
+
+def _named(made: dict[tuple[str, str], int], n: int) -> str:
+    """Return the problems and methods of which n runs were made; problems with the same methods together."""
+    methods: dict[str, list[str]] = {}
+    for (problem, method), count in made.items():
+        if count == n:
+            methods.setdefault(problem, []).append(method)
+    problems: dict[tuple[str, ...], list[str]] = {}
+    for problem, some in methods.items():
+        problems.setdefault(tuple(some), []).append(problem)
+    if list(made.values()).count(n) == len(made):
+        return "all"
+    return ", ".join(f"{', '.join(some)} on {' and '.join(where)}" for some, where in problems.items())
 
 
 def main(arguments: list[str]) -> None:
