@@ -20,7 +20,7 @@ from surehold.campaigns.peers import installed_peers
 from surehold.optimization import goal
 from surehold.problems.robust import ROBUST, RobustProblem, robust_problem
 
-THESIS = ("rkhs 0.01", "rkhs 0.02", "gm 0.1", "gm 0.05", "gm 0.01")
+THESIS = ("rkhs 0.01", "rkhs 0.02", "gm 0.1", "gm 0.05", "gm 0.02", "gm 0.01")
 BUDGETS = {1: 50, 2: 60, 3: 80, 5: 120, 7: 150}
 EVERY = 5
 METHODS = {
@@ -126,9 +126,7 @@ def trials_to(regret, target, quantile):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=10)
-    parser.add_argument(
-        "--problems", nargs="+", default=["rkhs 0.01", "rkhs 0.02", "gm 0.1", "gm 0.05", "gm 0.01", *ROBUST]
-    )
+    parser.add_argument("--problems", nargs="+", default=[*THESIS, *ROBUST])
     parser.add_argument("--methods", nargs="+", default=[*METHODS, *installed_peers()])
     arguments = parser.parse_args()
     print(f"{arguments.seeds} seeds; regret in % of the best robust value")

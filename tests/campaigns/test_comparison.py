@@ -170,6 +170,13 @@ def test_differences_that_are_not_shown_stand_beside_the_printed_ones(sign):
         )
 
 
+def test_equal_answers_everywhere_need_no_number_of_seeds():
+    results = {("glass", m): drawn(0.05, 0.01, 30) for m in ("BO", "UBO")}
+    told = claim_results({"table-4.4-grasps": records_of("table-4.4-grasps", 30, results, "std")})
+    (only,) = [t for t in told if t.result]
+    assert (only.verdict, only.reason) == ("not shown", "both give the same answer on 30 of 30 seeds")
+
+
 def test_grasps_have_no_known_maximum_to_be_near_to():
     results = {("glass side", "GP"): drawn(0.45, 0.1, 30), ("glass side", "TGP-winf"): drawn(0.45, 0.1, 30, 5)}
     told = claim_results({"table-4.2": records_of("table-4.2", 30, results)})

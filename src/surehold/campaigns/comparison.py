@@ -238,7 +238,7 @@ def _beside_the_printed(records: Records, claim: Claim, difference: Paired, word
         )
         own = sum(second.values()) / len(second)
         parts.append(f"{claim.than} alone ends with {number(own, 2)} here, {number(printed[1].mean, 2)} in print")
-    if word == "not shown":
+    if word == "not shown" and difference.mean != 0.0:
         if (difference.mean > 0.0) == (claim.measure in LOWER):
             parts.append("ours has the other sign")
         else:

@@ -213,7 +213,6 @@ OPEN_PLACES: Final = (
         "DIRECT, its budget and the local polish are not described.",
         "500 evaluations a dimension, a tenth of them for a polish along the gradient, then five starts by the "
         "incumbent. As in the program, DIRECT ends with the round that gains less than 1e-12. On GM the biased "
-        "improvement is of that size, and the search ends near the centers of the leaves; searched further, w1, "
-        "w2 and w3 stay at the level of BO-GP.",
+        "improvement is of that size, and the search ends near the centers of the leaves.",
     ),
 )
