@@ -22,9 +22,9 @@ from threadpoolctl import threadpool_limits
 
 import surehold as sh
 from benchmarks.best_observed import BUDGETS, problem_named, share_reached
-from surehold.optimization.acquisition import Acquisition
-from surehold.optimization.gaussian_process_posterior import GaussianProcessPosterior
-from surehold.optimization.goal import Goal
+from surehold.optimization.acquisition.scales import Acquisition
+from surehold.optimization.strategy.goal import Goal
+from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 
 BATCH = 4
 

@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 import surehold as sh
-from surehold.optimization.threads import single_threaded
+from surehold.optimization.numerics.threads import single_threaded
 
 SEEDS, INITIAL, CHECKS = 30, 20, (30, 40, 50, 60, 70, 80)
 VARIABLES = ("dx", "dy", "dz")

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from surehold.grasping import OBJECTS
-from surehold.grasping.dynamics import GraspChecker
-from surehold.optimization.threads import single_threaded
-from surehold.problems.grasp import Grasp
+from surehold.grasping.physics.check import GraspChecker
+from surehold.optimization.numerics.threads import single_threaded
+from surehold.problems.grasp.problem import Grasp
 
 DRAWN, CHECKED, BINS = 1500, 60, 5
 

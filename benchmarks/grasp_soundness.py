@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from surehold.grasping import MODES, OBJECTS, Simulator, default_pose, grasp_batch
-from surehold.optimization.threads import single_threaded
+from surehold.optimization.numerics.threads import single_threaded
 
 TRIALS, CLOSINGS = 2000, 200
 

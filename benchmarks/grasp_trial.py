@@ -11,8 +11,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from surehold.grasping import CONTACT_MODELS, OBJECTS, STATUSES
-from surehold.optimization.threads import single_threaded
-from surehold.problems.grasp import Grasp
+from surehold.optimization.numerics.threads import single_threaded
+from surehold.problems.grasp.problem import Grasp
 
 TRIALS = 400
 

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 
 import surehold as sh
 from surehold.campaigns.peers import installed_peers
-from surehold.optimization import goal
+from surehold.optimization.strategy import goal
 from surehold.problems.robust import ROBUST, RobustProblem, robust_problem
 
 THESIS = ("rkhs 0.01", "rkhs 0.02", "gm 0.1", "gm 0.05", "gm 0.02", "gm 0.01")

@@ -22,10 +22,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from surehold.grasping.friction_cones import contact_wrenches
-from surehold.grasping.inscribed_ball import ball_radius
-from surehold.grasping.linear_programs import force_closure
-from surehold.grasping.wrench_space import wrench_quality
+from surehold.grasping.wrench.force_closure import force_closure
+from surehold.grasping.wrench.friction_cones import contact_wrenches
+from surehold.grasping.wrench.hull.inscribed_ball import ball_radius
+from surehold.grasping.wrench.wrench_space import wrench_quality
 
 
 def spread_contacts(rng, c):

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from surehold import grasping, problems
     from surehold.errors import InputError, SureholdError
+    from surehold.optimization.acquisition.risk_measures import Risk
     from surehold.optimization.box import Box
-    from surehold.optimization.gaussian_process import GaussianProcess
-    from surehold.optimization.input_noise import InputNoise
     from surehold.optimization.maximization import Result, Trial, maximize
+    from surehold.optimization.noise.input_noise import InputNoise
+    from surehold.optimization.noise.quadratures import sigma_points
     from surehold.optimization.optimizer import Optimizer
-    from surehold.optimization.quadratures import sigma_points
     from surehold.optimization.recommendation import Recommendation
-    from surehold.optimization.risk import Risk
-    from surehold.optimization.treed_gaussian_process import TreedGaussianProcess
+    from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+    from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
     from surehold.studies.sampler import Sampler
 
 __version__ = "0.1.0"
@@ -43,19 +43,19 @@ __all__ = [
 
 _HOMES = {
     "Box": "optimization.box",
-    "GaussianProcess": "optimization.gaussian_process",
+    "GaussianProcess": "optimization.surrogates.gaussian_process.model",
     "InputError": "errors",
-    "InputNoise": "optimization.input_noise",
+    "InputNoise": "optimization.noise.input_noise",
     "Optimizer": "optimization.optimizer",
     "Recommendation": "optimization.recommendation",
-    "Risk": "optimization.risk",
+    "Risk": "optimization.acquisition.risk_measures",
     "Result": "optimization.maximization",
     "Sampler": "studies.sampler",
     "SureholdError": "errors",
-    "TreedGaussianProcess": "optimization.treed_gaussian_process",
+    "TreedGaussianProcess": "optimization.surrogates.treed.model",
     "Trial": "optimization.maximization",
     "maximize": "optimization.maximization",
-    "sigma_points": "optimization.quadratures",
+    "sigma_points": "optimization.noise.quadratures",
 }
 
 

@@ -14,10 +14,10 @@ try:
 except ImportError as error:
     raise ImportError("surehold.sklearn needs scikit-learn; install it with: pip install surehold[sklearn]") from error
 
-from surehold.optimization.gaussian_process import GaussianProcess, NoiseName
-from surehold.optimization.gaussian_process_posterior import GaussianProcessPosterior
-from surehold.optimization.hyperparameters import Learning
-from surehold.optimization.treed_gaussian_process import TreedGaussianProcess
+from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, NoiseName
+from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
+from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
 __all__ = ["GaussianProcessRegressor", "TreedGaussianProcessRegressor"]
 

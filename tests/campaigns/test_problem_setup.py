@@ -3,8 +3,8 @@ import pytest
 
 from surehold.campaigns.plan import ProblemSetup
 from surehold.campaigns.problem_setup import SimoxGrasp, build_problem, noise_of, observer
-from surehold.grasping.simox import object_wrench_space, simox_quality
-from surehold.problems.grasp import Grasp
+from surehold.grasping.wrench.simox import object_wrench_space, simox_quality
+from surehold.problems.grasp.problem import Grasp
 from surehold.problems.synthetic import GM
 
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from surehold.campaigns.plan import MethodSetup, Plan, ProblemSetup
 from surehold.campaigns.single_run import TIMES, changes, expanded, run_once
-from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.maximization import maximize
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.perturbation import robust_score
 from surehold.problems.synthetic import RKHS, synthetic_function
 

@@ -6,8 +6,8 @@ import coal
 import numpy as np
 from exact_mesh import ExactMesh, capsule_pair
 
-from surehold.grasping.hand import CLOSED, link_ends
-from surehold.grasping.synergy import closing_motion
+from surehold.grasping.hand.model import CLOSED, link_ends
+from surehold.grasping.hand.synergy import closing_motion
 
 _TOUCH = 1e-5  # m
 

@@ -10,7 +10,7 @@ import yaml
 
 from surehold.errors import InputError
 from surehold.grasping.formats import StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
-from surehold.grasping.wrench_space import wrench_quality
+from surehold.grasping.wrench.wrench_space import wrench_quality
 
 HEADER = "format: isaac_grasp\nformat_version: 1.0\nobject_frame: mug\ngripper_frame: hand\n"
 # layout of the published specification; Isaac Sim appends _link to the names of the frames

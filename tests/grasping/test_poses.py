@@ -3,8 +3,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
-from surehold.grasping.icub_hand import icub_left_hand
-from surehold.grasping.meshes import shipped_object
+from surehold.grasping.hand.icub import icub_left_hand
+from surehold.grasping.object.model import shipped_object
 from surehold.grasping.poses import FACETS, MODES, Pose, default_pose, facet_axes
 
 NORMALS = dict(

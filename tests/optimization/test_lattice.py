@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from surehold.optimization.box import Box
-from surehold.optimization.gaussian_process import GaussianProcess
-from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.lattice import Lattice, LatticePosterior
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.treed_gaussian_process import TreedGaussianProcess
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
 LEVELS = 5
 

@@ -3,8 +3,8 @@ import pytest
 
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.maximization import maximize
+from surehold.optimization.noise.input_noise import InputNoise
 
 BOX = Box({"x": (-1.0, 2.0)})
 

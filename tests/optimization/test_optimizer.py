@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
-from surehold.optimization.acquisition import CRITERIA
+from surehold.optimization.acquisition.scales import CRITERIA
 from surehold.optimization.box import Box
-from surehold.optimization.designs import design
-from surehold.optimization.gaussian_process import GaussianProcess
-from surehold.optimization.hyperparameters import Learning
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.presets import THESIS
+from surehold.optimization.strategy.initial_design import design
+from surehold.optimization.strategy.presets import THESIS
+from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.problems import GM
 
 BOX = Box({"a": (-1.0, 3.0), "b": (0.0, 10.0)})

@@ -3,7 +3,7 @@ import pytest
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems import GM, RKHS, Function, perturbed_points, robust_score
 
 

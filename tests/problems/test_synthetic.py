@@ -7,7 +7,7 @@ from scipy.stats import norm
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems import GF, GM, RKHS, GaussianBumps, perturbed_points, robust_optimum, synthetic_function
 
 FOUR = [RKHS(), GM(), GF(), GF(stretched=True)]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from surehold.campaigns.plan import ProblemSetup
 from surehold.campaigns.plan_file import load_plan
 from surehold.campaigns.problem_setup import SimoxGrasp, build_problem
+from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.presets import TreedSettings, thesis_preset
-from surehold.optimization.quadratures import sigma_points
-from surehold.optimization.surrogate import Posterior, mixture
+from surehold.optimization.strategy.presets import TreedSettings, thesis_preset
+from surehold.optimization.surrogates.protocol import Posterior, mixture
 from surehold.problems.synthetic import synthetic_function
 from surehold.reports import gather
 from surehold.reports.campaign_report import Band, Line, Panel, Picture, Points

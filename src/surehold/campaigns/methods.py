@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from surehold.campaigns.peers import PEERS, REQUIRES, installed_peers
 from surehold.campaigns.plan import Cell
 from surehold.errors import InputError, unknown_name
+from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
-from surehold.optimization.gaussian_process import GaussianProcess
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.presets import TREED, TreedSettings, thesis_preset
-from surehold.optimization.risk import Risk
-from surehold.optimization.surrogates import SURROGATES
+from surehold.optimization.strategy.presets import TREED, TreedSettings, thesis_preset
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.named import SURROGATES
 
 __all__ = ["METHODS", "Method", "build_method", "checked_method", "checked_settings"]
 

@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.campaigns.plan import ProblemSetup
 from surehold.errors import InputError, unknown_name
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.problem import Problem, checked_points
 
 if TYPE_CHECKING:
-    from surehold.problems.grasp import Grasp
+    from surehold.problems.grasp.problem import Grasp
 
 __all__ = ["SimoxGrasp", "build_problem", "checked_problem", "noise_of", "observer"]
 
@@ -26,7 +26,7 @@ class SimoxGrasp:
     """
 
     def __init__(self, grasp: "Grasp"):
-        from surehold.grasping.simox import object_wrench_space
+        from surehold.grasping.wrench.simox import object_wrench_space
 
         self.name: Final = grasp.name
         self.box: Final = grasp.box
@@ -36,7 +36,7 @@ class SimoxGrasp:
 
     def __call__(self, x: ArrayLike) -> float | NDArray[np.float64]:
         """Return the quality at x (d,) as a float, or the qualities at x (n, d) as an array (n,)."""
-        from surehold.grasping.simox import simox_quality
+        from surehold.grasping.wrench.simox import simox_quality
 
         points, single = checked_points(x, self.box)
         contacts = [self.base.grasp(point).contacts for point in points]
@@ -77,7 +77,7 @@ def build_problem(on: ProblemSetup) -> Problem:
         If an argument has no valid value, or an own function cannot be loaded.
     """
     if on.function == "grasp":
-        from surehold.problems.grasp import Grasp
+        from surehold.problems.grasp.problem import Grasp
 
         arguments: dict[str, Any] = dict(on.arguments)
         simox = arguments.get("quality") == "simox"

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from surehold.campaigns.methods import Method, build_method
 from surehold.campaigns.plan import Cell
 from surehold.campaigns.problem_setup import build_problem, noise_of, observer
-from surehold.optimization.designs import design
-from surehold.optimization.threads import single_threaded
+from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.strategy.initial_design import design
 from surehold.problems.perturbation import robust_score
 
 __all__ = ["TIMES", "changes", "expanded", "run_once", "versions"]

@@ -68,7 +68,7 @@ def kernel_folders() -> set[Path]:
 
 def data_cache() -> str:
     """Return the folder of computed data, such as distance fields, and what it holds."""
-    from surehold.grasping.distance_field import cache_folder
+    from surehold.grasping.object.distance_field import cache_folder
 
     folder = cache_folder()
     sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]

@@ -83,7 +83,7 @@ def grasp(
     from surehold.cli.session import Kept, folder_for, run_session
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
-    from surehold.problems.grasp import Grasp
+    from surehold.problems.grasp.problem import Grasp
     from surehold.reports import files, gather
     from surehold.reports.run_report import Candidate, RunReport
     from surehold.reports.still import still_picture
@@ -124,7 +124,7 @@ def grasp(
     described["facet"] = problem.facet
     checker = None
     if check:
-        from surehold.grasping.dynamics import GraspChecker
+        from surehold.grasping.physics.check import GraspChecker
 
         checker = GraspChecker(problem.simulator)  # before the run: without MuJoCo it says so at once
     folder = folder_for(f"{problem.object.name} {problem.facet}", method, seed, out, study)

@@ -57,7 +57,7 @@ def object_of(name: str, unit: str, mass: float | None, frame: str | None, conso
     InputError
         If the file is refused, or options of a mesh are given for a shipped object.
     """
-    from surehold.grasping.meshes import OBJECTS, shipped_object
+    from surehold.grasping.object.model import OBJECTS, shipped_object
 
     if name in OBJECTS or not (Path(name).suffix or Path(name).exists()):
         options = {"--unit": unit or None, "--mass": mass, "--frame": frame}
@@ -65,8 +65,8 @@ def object_of(name: str, unit: str, mass: float | None, frame: str | None, conso
         if name in OBJECTS and given:
             raise InputError(f"{given[0]} is for mesh files; '{name}' is shipped with its own size and mass.")
         return shipped_object(name)
-    from surehold.grasping.distance_field import distance_field_of
-    from surehold.grasping.mesh_files import load_mesh
+    from surehold.grasping.object.distance_field import distance_field_of
+    from surehold.grasping.object.mesh_files import load_mesh
 
     loaded = load_mesh(name, unit or None, mass, frame or "auto")
     console.print(loaded.diagnosis, markup=False, soft_wrap=True)
@@ -83,7 +83,7 @@ def hand_of(name: str, config: str) -> Any:
     InputError
         If the hand is unknown, a file is refused, or one of model and description is missing.
     """
-    from surehold.grasping.hands import hand_named
+    from surehold.grasping.hand.named import hand_named
 
     if not Path(name).suffix:
         if config:
@@ -91,7 +91,7 @@ def hand_of(name: str, config: str) -> Any:
         return hand_named(name)
     if not config:
         raise InputError(f"--hand {name} is a model file; describe its palm and fingers with --hand-config hand.yaml.")
-    from surehold.grasping.hand_files import load_hand
+    from surehold.grasping.hand.files import load_hand
 
     return load_hand(name, config)
 

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from surehold.errors import InputError, unknown_name
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 
 __all__ = [
     "METHODS",

@@ -52,9 +52,9 @@ def scene(
     from surehold.cli.compilation import announced
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
-    from surehold.grasping.meshes import OBJECTS
-    from surehold.problems.grasp import Grasp
-    from surehold.problems.grasp_defaults import default_facet
+    from surehold.grasping.object.model import OBJECTS
+    from surehold.problems.grasp.default_poses import default_facet
+    from surehold.problems.grasp.problem import Grasp
     from surehold.reports import files, gather
     from surehold.reports.run_report import Candidate
     from surehold.reports.scenes_page import render_scenes

@@ -19,8 +19,8 @@ from surehold.cli.compilation import announced, warm_up
 from surehold.cli.interruption import undisturbed
 from surehold.cli.terminal import terminal
 from surehold.errors import InputError, SureholdError
-from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.maximization import Result, Trial, maximize
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.perturbation import RobustScore, robust_score
 from surehold.problems.problem import Problem
 from surehold.reports import files, gather, page

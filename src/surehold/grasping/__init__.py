@@ -5,75 +5,75 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from surehold.grasping.batch import GraspBatch, grasp_batch
-    from surehold.grasping.closing import CLOSING_MODES
-    from surehold.grasping.contacts import CONTACT_MODELS, Contacts
-    from surehold.grasping.distance_field import DistanceField, distance_field_of
-    from surehold.grasping.dynamics import GraspCheck, GraspChecker
+    from surehold.grasping.closing.closing import CLOSING_MODES
+    from surehold.grasping.closing.contacts import CONTACT_MODELS, Contacts
     from surehold.grasping.formats import GraspFile, StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
-    from surehold.grasping.friction_cones import contact_wrenches, soft_finger_torsion
-    from surehold.grasping.grasp import COLLISIONS, STATUSES, Grasp, Simulator
-    from surehold.grasping.hand import Hand, Preshape
-    from surehold.grasping.hands import HANDS, hand_named
-    from surehold.grasping.icub_hand import icub_left_hand, icub_right_hand
-    from surehold.grasping.inscribed_ball import ball_radius
-    from surehold.grasping.linear_programs import force_closure, gravity_wrenches, task_quality
-    from surehold.grasping.meshes import OBJECTS, GraspObject, shipped_object
+    from surehold.grasping.hand.icub import icub_left_hand, icub_right_hand
+    from surehold.grasping.hand.model import Hand, Preshape
+    from surehold.grasping.hand.named import HANDS, hand_named
+    from surehold.grasping.object.distance_field import DistanceField, distance_field_of
+    from surehold.grasping.object.model import OBJECTS, GraspObject, shipped_object
+    from surehold.grasping.physics.check import GraspCheck, GraspChecker
+    from surehold.grasping.pictures.scene import Scene, SceneMesh, grasp_scene
     from surehold.grasping.pose_noise import PoseNoise, RobustQuality, robust_quality
     from surehold.grasping.poses import FACETS, MODES, Pose, default_pose
-    from surehold.grasping.quality import QUALITIES
-    from surehold.grasping.scene import Scene, SceneMesh, grasp_scene
-    from surehold.grasping.simox import ObjectWrenchSpace, object_wrench_space, simox_quality
-    from surehold.grasping.wrench_space import WrenchQuality, wrench_quality
+    from surehold.grasping.simulator import COLLISIONS, STATUSES, Grasp, Simulator
+    from surehold.grasping.wrench.force_closure import force_closure, gravity_wrenches, task_quality
+    from surehold.grasping.wrench.friction_cones import contact_wrenches, soft_finger_torsion
+    from surehold.grasping.wrench.hull.inscribed_ball import ball_radius
+    from surehold.grasping.wrench.quality import QUALITIES
+    from surehold.grasping.wrench.simox import ObjectWrenchSpace, object_wrench_space, simox_quality
+    from surehold.grasping.wrench.wrench_space import WrenchQuality, wrench_quality
 
 _HOMES = {
-    "CLOSING_MODES": "closing",
-    "COLLISIONS": "grasp",
-    "CONTACT_MODELS": "contacts",
-    "Contacts": "contacts",
-    "DistanceField": "distance_field",
+    "CLOSING_MODES": "closing.closing",
+    "COLLISIONS": "simulator",
+    "CONTACT_MODELS": "closing.contacts",
+    "Contacts": "closing.contacts",
+    "DistanceField": "object.distance_field",
     "FACETS": "poses",
-    "Grasp": "grasp",
+    "Grasp": "simulator",
     "GraspBatch": "batch",
-    "GraspCheck": "dynamics",
-    "GraspChecker": "dynamics",
+    "GraspCheck": "physics.check",
+    "GraspChecker": "physics.check",
     "GraspFile": "formats",
-    "GraspObject": "meshes",
-    "HANDS": "hands",
-    "Hand": "hand",
+    "GraspObject": "object.model",
+    "HANDS": "hand.named",
+    "Hand": "hand.model",
     "MODES": "poses",
-    "OBJECTS": "meshes",
-    "ObjectWrenchSpace": "simox",
+    "OBJECTS": "object.model",
+    "ObjectWrenchSpace": "wrench.simox",
     "Pose": "poses",
     "PoseNoise": "pose_noise",
-    "Preshape": "hand",
-    "QUALITIES": "quality",
+    "Preshape": "hand.model",
+    "QUALITIES": "wrench.quality",
     "RobustQuality": "pose_noise",
-    "STATUSES": "grasp",
-    "Scene": "scene",
-    "SceneMesh": "scene",
-    "Simulator": "grasp",
+    "STATUSES": "simulator",
+    "Scene": "pictures.scene",
+    "SceneMesh": "pictures.scene",
+    "Simulator": "simulator",
     "StoredGrasp": "formats",
-    "WrenchQuality": "wrench_space",
-    "ball_radius": "inscribed_ball",
-    "contact_wrenches": "friction_cones",
+    "WrenchQuality": "wrench.wrench_space",
+    "ball_radius": "wrench.hull.inscribed_ball",
+    "contact_wrenches": "wrench.friction_cones",
     "default_pose": "poses",
-    "distance_field_of": "distance_field",
-    "force_closure": "linear_programs",
+    "distance_field_of": "object.distance_field",
+    "force_closure": "wrench.force_closure",
     "grasp_batch": "batch",
-    "grasp_scene": "scene",
+    "grasp_scene": "pictures.scene",
     "grasp_to_dict": "formats",
-    "gravity_wrenches": "linear_programs",
-    "hand_named": "hands",
-    "icub_left_hand": "icub_hand",
-    "icub_right_hand": "icub_hand",
-    "object_wrench_space": "simox",
+    "gravity_wrenches": "wrench.force_closure",
+    "hand_named": "hand.named",
+    "icub_left_hand": "hand.icub",
+    "icub_right_hand": "hand.icub",
+    "object_wrench_space": "wrench.simox",
     "read_isaac_grasps": "formats",
     "robust_quality": "pose_noise",
-    "shipped_object": "meshes",
-    "simox_quality": "simox",
-    "soft_finger_torsion": "friction_cones",
-    "task_quality": "linear_programs",
-    "wrench_quality": "wrench_space",
+    "shipped_object": "object.model",
+    "simox_quality": "wrench.simox",
+    "soft_finger_torsion": "wrench.friction_cones",
+    "task_quality": "wrench.force_closure",
+    "wrench_quality": "wrench.wrench_space",
     "write_isaac_grasps": "formats",
 }
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
-from surehold.grasping.grasp import STATUSES, Simulator
 from surehold.grasping.poses import Pose
+from surehold.grasping.simulator import STATUSES, Simulator
 
 __all__ = ["GraspBatch", "grasp_batch"]
 

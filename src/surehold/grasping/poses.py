@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.hand import Hand
-from surehold.grasping.meshes import GraspObject
+from surehold.grasping.hand.model import Hand
+from surehold.grasping.object.model import GraspObject
 
 __all__ = ["FACETS", "MODES", "Pose", "default_pose"]
 

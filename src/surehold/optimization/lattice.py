@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.optimization.surrogate import FitDiagnostics, Moments, Posterior, Regions
+from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
 
 __all__ = ["Lattice", "LatticePosterior"]
 

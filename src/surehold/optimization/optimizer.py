@@ -11,27 +11,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.optimization.acquisition import criterion_name
+from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.acquisition.scales import criterion_name
 from surehold.optimization.box import Box
-from surehold.optimization.designs import design as initial_design
-from surehold.optimization.gaussian_process import NoiseName
-from surehold.optimization.goal import Goal
-from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.lattice import Lattice, LatticePosterior
-from surehold.optimization.noisy_inputs import (
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.noise.quadratures import exact
+from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.recommendation import Recommendation, recommendation
+from surehold.optimization.strategy.goal import Goal
+from surehold.optimization.strategy.initial_design import design as initial_design
+from surehold.optimization.strategy.presets import thesis_preset
+from surehold.optimization.surrogates.gaussian_process.model import NoiseName
+from surehold.optimization.surrogates.named import surrogate_named
+from surehold.optimization.surrogates.noisy_inputs import (
     NoisySurrogate,
     condition_on_noisy_inputs,
     noise_from_reached,
     noise_from_repeats,
 )
-from surehold.optimization.presets import thesis_preset
-from surehold.optimization.quadratures import exact
-from surehold.optimization.recommendation import Recommendation, recommendation
-from surehold.optimization.risk import Risk
-from surehold.optimization.robustness import Perturbations
-from surehold.optimization.surrogate import Posterior, Surrogate, mixture
-from surehold.optimization.surrogates import surrogate_named
-from surehold.optimization.threads import single_threaded
+from surehold.optimization.surrogates.protocol import Posterior, Surrogate, mixture
 from surehold.optimization.trials import Trials, same
 
 __all__ = ["Optimizer"]

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.optimization.robustness import Perturbations
-from surehold.optimization.surrogate import Posterior
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.surrogates.protocol import Posterior
 
 __all__ = ["Outcome", "Recommendation", "outcome_of"]
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from surehold.problems.function import Function, load_function, parse_bounds
-    from surehold.problems.grasp import Grasp
+    from surehold.problems.grasp.problem import Grasp
     from surehold.problems.perturbation import RobustScore, perturbed_points, robust_score
     from surehold.problems.problem import Optimum, Problem
     from surehold.problems.robust import RobustProblem, robust_problem
@@ -35,7 +35,7 @@ _HOMES = {
     "Function": "function",
     "load_function": "function",
     "parse_bounds": "function",
-    "Grasp": "grasp",
+    "Grasp": "grasp.problem",
     "RobustScore": "perturbation",
     "perturbed_points": "perturbation",
     "robust_score": "perturbation",

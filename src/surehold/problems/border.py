@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 
 __all__ = ["Moments", "moments_at_border"]
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.problem import Problem, checked_points
 
 __all__ = ["RobustScore", "perturbed_points", "robust_score"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import unknown_name
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.synthetic import GaussianBumps
 
 __all__ = ["ROBUST", "RobustProblem", "robust_problem"]

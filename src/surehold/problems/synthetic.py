@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.border import Moments, moments_at_border
 from surehold.problems.problem import Optimum, checked_points
 

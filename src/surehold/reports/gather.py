@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.maximization import Result
-from surehold.optimization.quadratures import sigma_points
-from surehold.optimization.surrogate import Posterior, mixture
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.quadratures import sigma_points
+from surehold.optimization.surrogates.protocol import Posterior, mixture
 from surehold.problems.perturbation import RobustScore
 from surehold.reports.run_report import (
     Candidate,
@@ -26,7 +26,7 @@ from surehold.reports.run_report import (
 )
 
 if TYPE_CHECKING:
-    from surehold.grasping.scene import Scene as GraspScene
+    from surehold.grasping.pictures.scene import Scene as GraspScene
 
 __all__ = ["answers", "candidate", "grasp_scene", "report_of", "surfaces_of"]
 

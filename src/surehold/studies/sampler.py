@@ -20,9 +20,9 @@ from optuna.trial import FrozenTrial
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.surrogate import Surrogate
+from surehold.optimization.surrogates.protocol import Surrogate
 from surehold.studies.history import History, history_of
 from surehold.studies.search_space import SearchSpace
 

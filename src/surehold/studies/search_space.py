@@ -28,8 +28,8 @@ from optuna.distributions import (
 
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
-from surehold.optimization.input_noise import InputNoise
 from surehold.optimization.lattice import Lattice
+from surehold.optimization.noise.input_noise import InputNoise
 
 __all__ = ["SearchSpace"]
 

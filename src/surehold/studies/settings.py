@@ -11,8 +11,8 @@ import numpy as np
 from optuna.study import Study
 
 from surehold.errors import InputError
-from surehold.optimization.input_noise import InputNoise
-from surehold.optimization.risk import Risk
+from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.studies.sampler import Sampler
 from surehold.studies.search_space import SearchSpace
 

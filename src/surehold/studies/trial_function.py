@@ -68,9 +68,9 @@ def problem_of(settings: StudySettings, function: str = "") -> Callable[[Any], A
 
 def _grasp(described: Mapping[str, Any], preset: str) -> Callable[[Any], Any]:
     """Return the grasp that `surehold grasp` has described; files are found by the same paths."""
-    from surehold.grasping.hand_files import load_hand
-    from surehold.grasping.hands import hand_named
-    from surehold.grasping.mesh_files import load_mesh
+    from surehold.grasping.hand.files import load_hand
+    from surehold.grasping.hand.named import hand_named
+    from surehold.grasping.object.mesh_files import load_mesh
     from surehold.problems import Grasp
 
     obj, hand = described["object"], described["hand"]

@@ -1,0 +1,1 @@
+"""Closing the hand: gaps, first contacts, soft touch."""

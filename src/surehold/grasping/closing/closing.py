@@ -1,0 +1,246 @@
+"""Close the hand: every finger moves until it first touches, found by conservative advancement (compiled).
+
+    t       closing parameter, from 0 (open) to T (closed); it is the clock of all fingers
+    t_j     when joint j is stopped; infinite while nothing stops it
+    q(t)    joint angles, clip(start + rate min(t, t_j), lower, upper), rad
+    gap     distance between two bodies, m
+    v       upper bound of the speed at which a gap can shrink, m per unit of t
+
+A gap that is g at time t stays open until t + g / v. The times until which each gap is certified open are kept, and
+always the earliest of them is looked at again: no step size, no touch missed, and the exact order of the touches
+(Mirtich 1996, chapter 2; Zhang, Lee and Kim 2006). A gap below `TOUCH` is a touch.
+
+`adaptive`: a touch stops the joints that move the touching link; the links beyond it go on. `synergy`: it stops all
+joints of the finger. Fingers stop each other and stop at the palm in the same way. Bodies of the hand that already
+touch while it is open are neighbors at rest and are not looked at.
+
+Passes. A link that comes near the object and goes past it without a touch ends up far away from where a touch would
+have left it: however soft the contacts, the outcome jumps between a narrow hit and a narrow miss. The closest approach
+of such a link is therefore reported, if it is nearer than `brush`, and the closing can be repeated with the link held
+there; contacts.py blends the two outcomes.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from surehold.grasping.closing.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap
+from surehold.grasping.hand.model import axis_ends, finger_frames
+
+__all__ = ["CLOSING_MODES", "TOUCH", "Closed", "close_hand", "hand_gaps"]
+
+CLOSING_MODES: Final = ("adaptive", "synergy")
+TOUCH: Final = 5e-6  #: a smaller gap is a touch [m]
+_PALM_LINK = 2  # from this link on a finger can reach the palm
+
+
+class Closed(NamedTuple):
+    """How a hand has closed."""
+
+    joints: NDArray[np.float64]  #: (f, j) rad or m
+    touched: NDArray[np.bool_]  #: (f j,) which links were stopped by the object
+    pass_time: NDArray[np.float64]  #: (f j,) closing parameter of a link's closest approach in passing, or infinity
+    pass_gap: NDArray[np.float64]  #: (f j,) gap there, below `brush` [m]
+    pass_leave: NDArray[np.float64]  #: (f j,) largest gap found afterwards [m]
+    looks: int  #: number of gaps computed
+
+
+@njit(cache=True)
+def _finger_at(f, t, bases, chains, motion, stop, ends):
+    """Write the link ends of finger f at time t; motion is (4, f, j): start, rate, lower, upper; stop (f, j)."""
+    joints = chains.shape[1]
+    q = np.empty(joints)
+    frames = np.empty((joints, 3, 4))
+    for j in range(joints):
+        angle = motion[0, f, j] + motion[1, f, j] * min(t, stop[f, j])
+        q[j] = min(max(angle, motion[2, f, j]), motion[3, f, j])
+    finger_frames(bases[f], chains[f], q, frames)
+    axis_ends(frames, chains[f], ends)
+
+
+@njit(cache=True)
+def _speed(f, k, t, motion, stop, reach):
+    """Return an upper bound of the speed of link k of finger f from time t on."""
+    v = 0.0
+    for j in range(k + 1):
+        rate = motion[1, f, j]
+        if stop[f, j] <= t or rate == 0.0:
+            continue
+        final = motion[3, f, j] if rate > 0.0 else motion[2, f, j]
+        if (motion[0, f, j] + rate * t - final) * rate < 0.0:  # not yet at the end of its range
+            v += abs(rate) * reach[f, j, k]
+    return v
+
+
+@njit(cache=True)
+def _begins(f, k, motion, stop):
+    """Return the time at which the first joint that moves link k of finger f leaves the end of its range."""
+    first = np.inf
+    for j in range(k + 1):
+        rate = motion[1, f, j]
+        if stop[f, j] > 0.0 and rate != 0.0:
+            origin = motion[2, f, j] if rate > 0.0 else motion[3, f, j]
+            first = min(first, max((origin - motion[0, f, j]) / rate, 0.0))
+    return first
+
+
+@njit(cache=True)
+def _gap_at(f, k, t, nodes, frame, bases, chains, motion, stop, radius, ends):
+    """Return the gap between link k of finger f and the object at time t [m]."""
+    _finger_at(f, t, bases, chains, motion, stop, ends)
+    return capsule_gap(nodes, frame, ends[k, 0], ends[k, 1], radius, 1e-6, 0.0)[0]
+
+
+@njit(cache=True)
+def _closest(f, k, early, late, nodes, frame, bases, chains, motion, stop, radius, ends):
+    """Return time and gap of the closest approach between two times; an infinite gap if it is at one of them."""
+    share = 0.5 * (np.sqrt(5.0) - 1.0)  # golden section
+    a, b = early, late
+    c, d = b - share * (b - a), a + share * (b - a)
+    gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends)
+    gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends)
+    for _ in range(22):  # to 3e-5 of the interval
+        if gc < gd:
+            b, d, gd = d, c, gc
+            c = b - share * (b - a)
+            gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends)
+        else:
+            a, c, gc = c, d, gd
+            d = a + share * (b - a)
+            gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends)
+    t, gap = (c, gc) if gc < gd else (d, gd)
+    first = _gap_at(f, k, early, nodes, frame, bases, chains, motion, stop, radius, ends)
+    last = _gap_at(f, k, late, nodes, frame, bases, chains, motion, stop, radius, ends)
+    return t, (gap if gap < min(first, last) else np.inf)
+
+
+@njit(cache=True)
+def hand_gaps(nodes, frame, ends, radii, palms, halves, roundings, enough):
+    """Return the gaps (f j + 1,) between the bodies of a resting hand and the object [m]; the palm is the last one.
+
+    A link that is not there has an infinite gap.
+    """
+    links = ends.shape[0]
+    gaps = np.full(links + 1, np.inf)
+    for b in range(links):
+        radius = radii[b // radii.shape[1], b % radii.shape[1]]
+        if radius > 0.0:
+            gaps[b] = capsule_gap(nodes, frame, ends[b, 0], ends[b, 1], radius, 1e-6, 0.0)[0]
+    for p in range(palms.shape[0]):
+        gap = palm_gap(nodes, frame, palms[p], halves[p], roundings[p], 1e-5, enough)
+        gaps[links] = min(gaps[links], gap)
+    return gaps
+
+
+@njit(cache=True)
+def close_hand(
+    nodes, frame, bases, chains, reach, motion, radii, palms, halves, roundings, adaptive, closed, brush, stop
+):
+    """Close the hand from its open posture, which must not touch the object.
+
+    Passes nearer than `brush` are reported (0: none). `stop` (f, j) holds times at which joints are stopped, whatever
+    they touch, infinite for none; it is changed to the times at which they were. Returns the fields of `Closed`.
+    """
+    fingers, per_finger = radii.shape
+    links = fingers * per_finger
+    touched = np.zeros(links, dtype=np.bool_)
+    mine = np.empty((per_finger, 2, 3))
+    other = np.empty((per_finger, 2, 3))
+
+    # The gaps to watch: link - object, link - palm, link - link of another finger.
+    most = links * (1 + palms.shape[0]) + links * links // 2
+    first = np.empty(most, dtype=np.int64)
+    second = np.full(most, -1, dtype=np.int64)  # -1 the object, -2 - p box p of the palm, else a link
+    total = 0
+    for b in range(links):
+        f, k = b // per_finger, b % per_finger
+        if radii[f, k] <= 0.0:
+            continue
+        first[total] = b
+        total += 1
+        for p in range(palms.shape[0] if k >= _PALM_LINK else 0):
+            first[total], second[total] = b, -2 - p
+            total += 1
+        for c in range((f + 1) * per_finger, links):
+            if radii[c // per_finger, c % per_finger] > 0.0:
+                first[total], second[total] = b, c
+                total += 1
+    open_until = np.empty(total)
+    resting = np.zeros(total, dtype=np.bool_)  # not looked at yet: at the first look a touch between neighbors is rest
+    for i in range(total):
+        until = _begins(first[i] // per_finger, first[i] % per_finger, motion, stop)
+        if second[i] >= 0:
+            until = min(until, _begins(second[i] // per_finger, second[i] % per_finger, motion, stop))
+        resting[i] = second[i] != -1
+        open_until[i] = until
+    pass_time = np.full(links, np.inf)
+    pass_gap = np.full(links, np.inf)
+    pass_leave = np.zeros(links)
+    looked = np.full((links, 2), np.inf)  # gap at the last look and at the one before
+    times = np.zeros((links, 2))
+    looks = 0
+    while True:
+        i = 0
+        for k in range(1, total):
+            if open_until[k] < open_until[i]:
+                i = k
+        t = open_until[i]
+        if t >= closed:
+            break
+        a, b = first[i], second[i]
+        fa, ka = a // per_finger, a % per_finger
+        v = _speed(fa, ka, t, motion, stop, reach)
+        if b >= 0:
+            v += _speed(b // per_finger, b % per_finger, t, motion, stop, reach)
+        if v == 0.0:
+            open_until[i] = np.inf
+            continue
+        looks += 1
+        radius = radii[fa, ka]
+        _finger_at(fa, t, bases, chains, motion, stop, mine)
+        if b == -1:
+            gap = capsule_gap(nodes, frame, mine[ka, 0], mine[ka, 1], radius, 0.2 * TOUCH, 0.2)[0]
+            if gap < 2.0 * brush:  # a gap that is underrated now and then hides the closest approach
+                gap = capsule_gap(nodes, frame, mine[ka, 0], mine[ka, 1], radius, 0.2 * TOUCH, 0.0)[0]
+        elif b < -1:
+            gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[ka, 0], mine[ka, 1], radius)
+        else:
+            fb, kb = b // per_finger, b % per_finger
+            _finger_at(fb, t, bases, chains, motion, stop, other)
+            gap = capsule_pair_gap(mine[ka, 0], mine[ka, 1], other[kb, 0], other[kb, 1], radius + radii[fb, kb])
+        if b == -1 and brush > 0.0:
+            pass_leave[a] = max(pass_leave[a], gap)
+            if looked[a, 0] < 1.5 * brush and looked[a, 0] <= looked[a, 1] and looked[a, 0] < gap:
+                when, near = _closest(fa, ka, times[a, 1], t, nodes, frame, bases, chains, motion, stop, radius, other)
+                if near < min(brush, pass_gap[a]):
+                    pass_time[a], pass_gap[a], pass_leave[a] = when, near, gap
+            looked[a, 1], times[a, 1] = looked[a, 0], times[a, 0]
+            looked[a, 0], times[a, 0] = gap, t
+        if gap > TOUCH:
+            advance = gap - 0.5 * TOUCH
+            if b == -1 and gap < 2.0 * brush:
+                advance = min(advance, 0.5 * brush)  # no closest approach slips through between two looks
+            open_until[i] = t + advance / v
+            resting[i] = False
+            continue
+        open_until[i] = np.inf
+        if resting[i]:
+            continue
+        if b == -1:
+            touched[a] = True
+        for body in (a, b):
+            if body < 0:
+                continue
+            f, k = body // per_finger, body % per_finger
+            last = k if adaptive else per_finger - 1
+            if _speed(f, k, t, motion, stop, reach) > 0.0:
+                for j in range(last + 1):
+                    stop[f, j] = min(stop[f, j], t)
+    joints = np.empty((fingers, per_finger))
+    for f in range(fingers):
+        for j in range(per_finger):
+            angle = motion[0, f, j] + motion[1, f, j] * min(closed, stop[f, j])
+            joints[f, j] = min(max(angle, motion[2, f, j]), motion[3, f, j])
+    return joints, touched, pass_time, pass_gap, pass_leave, looks

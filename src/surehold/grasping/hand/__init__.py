@@ -1,0 +1,1 @@
+"""What grasps: the iCub's hands and hands described by files."""

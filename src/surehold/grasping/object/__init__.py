@@ -1,0 +1,1 @@
+"""What is grasped: shipped objects, meshes, and their distance fields."""

@@ -1,0 +1,1 @@
+"""Scenes of a grasp as triangle meshes, for whoever draws them."""

@@ -1,0 +1,359 @@
+"""One trial: put the open hand at a pose, close it, find the contacts, measure how well they hold the object."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.errors import InputError, unknown_name
+from surehold.grasping.closing.closing import CLOSING_MODES, Closed, close_hand, hand_gaps
+from surehold.grasping.closing.contacts import (
+    CONTACT_MODELS,
+    DEPTH,
+    SKIN,
+    Contacts,
+    as_contacts,
+    blended,
+    pass_share,
+    skin_contacts,
+    skin_samples,
+    touch_contacts,
+)
+from surehold.grasping.hand.model import CLOSED, Hand, link_ends, link_frames
+from surehold.grasping.hand.named import hand_named
+from surehold.grasping.hand.synergy import ClosingMotion, closing_motion, preshape_of
+from surehold.grasping.object.distance_field import MARGIN, DistanceField, distance_field_of
+from surehold.grasping.object.model import GraspObject, shipped_object
+from surehold.grasping.poses import Pose
+from surehold.grasping.wrench.quality import Measure
+from surehold.grasping.wrench.wrench_space import WrenchQuality
+
+if TYPE_CHECKING:
+    from surehold.grasping.pictures.scene import Scene
+
+__all__ = ["COLLISIONS", "STATUSES", "THESIS", "Grasp", "Simulator"]
+
+Array = NDArray[np.float64]
+Status = Literal["ok", "no contact", "initial collision", "not closed"]
+
+#: What became of a trial. "ok": force closure. "no contact": fewer than two contacts. "initial collision": the open
+#: hand is inside the object. "not closed": contacts that do not resist every wrench.
+STATUSES: Final = ("ok", "no contact", "initial collision", "not closed")
+
+#: Worth of a hand that collides while it is open: a penalty that grows with the penetration, or 0.
+COLLISIONS: Final = ("penalty", "zero")
+
+#: Settings of the simulator behind the thesis.
+THESIS: Final = {
+    "contact": "single",
+    "quality": "simox",
+    "closing": "synergy",
+    "cones": "polyhedral",
+    "collision": "zero",
+}
+
+_PENALTY: Final = 0.05  # at the deepest penetration: half of a good epsilon
+_PENALTY_DEPTH: Final = 0.02  # depths of all bodies together at which the penalty is 63 % of that [m]
+_LEAST_SHARE: Final = 1e-3  # outcomes of a smaller share are not looked at
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp:
+    """Outcome of one trial. Points and normals are in the frame of the object."""
+
+    status: Status  #: see `STATUSES`
+    quality: float  #: the measure that was asked for; 0 without two contacts; a collision's is 0 or below
+    pose: Pose  #: from the palm frame to the object's frame
+    s1: float  #: posture variable [rad]
+    joints: Array = field(
+        repr=False
+    )  #: (f, j) joint angles [rad] or shifts [m] at the end, in the hand's order; a collision leaves it open
+    open_joints: Array = field(repr=False)  #: (f, j) joint angles or shifts of the open hand
+    contacts: Contacts = field(repr=False)  #: of the quality; empty after a collision
+    touching: tuple[str, ...] = field(repr=False)  #: names of the links that were stopped by the object
+    penetration: float  #: how deep the open hand is inside the object [m]; 0 without a collision
+    wrench: WrenchQuality | None = field(repr=False, default=None)  #: details of the measure; None without two contacts
+
+
+class _Geometry(NamedTuple):
+    """The hand in the object's frame, as the compiled functions take it."""
+
+    bases: Array  # (f, 3, 4)
+    palm: Array  # (3, 4) palm frame
+    palms: Array  # (p, 3, 4) frames of the palm's boxes
+
+
+class Simulator:
+    """A hand and an object: `grasp` closes the one on the other and measures the grasp.
+
+    Parameters
+    ----------
+    hand
+        A `Hand` or the name of a shipped one: "icub-left", "icub-right".
+    obj
+        A `GraspObject` or the name of a shipped one: "mug", "bottle", "glass", "drill".
+    contact
+        "graded" (soft touch, continuous), "patch" or "single" (one for each touching link).
+    quality
+        One of `QUALITIES`, explained in quality.py: "epsilon" (radius of the largest ball about the origin in the hull
+        of the wrenches), "signed_epsilon", "volume", "simox", "task" or "closure".
+    closing
+        "adaptive" (links beyond a touching one go on) or "synergy" (a touch stops the whole finger).
+    preshape
+        Type of grasp, one of the hand's `preshapes`; the first one if not given ("power" for the iCub).
+    friction
+        Coefficient of friction; the object's own if not given.
+    torsion
+        Torsional friction of soft fingers: largest moment about the normal by normal force [m], see
+        `soft_finger_torsion`; 0 for hard points.
+    cones
+        "round" or "polyhedral", with `edges` edges.
+    edges
+        Edges of polyhedral friction cones; also of the cones that "volume", "task" and "closure" measure.
+    convention
+        "normal_unit" (forces with unit normal component) or "unit_magnitude".
+    task
+        For the quality "task": external forces [N] and torques about the center of mass [N m], (k, 6), each as large
+        as it weighs; gravity in 14 directions if not given.
+    depth
+        Depth of the soft touch [m].
+    collision
+        Worth of a hand that is inside the object while it is open: "penalty", below 0 and falling with the depth of
+        the penetration (after Castanheira et al. 2018), or "zero".
+    object_pose
+        From the object's frame to the world in which `grasp` takes poses; if not given, the world is that frame.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or a number is out of range.
+
+    Notes
+    -----
+    A trial depends on its arguments alone; it is the same bit for bit when repeated. All geometry is computed in the
+    object's frame, with torques about the center of mass, divided by half the longest edge of the object's box: a
+    motion of hand and object together changes nothing.
+    """
+
+    def __init__(
+        self,
+        hand: Hand | str = "icub-left",
+        obj: GraspObject | str = "mug",
+        *,
+        contact: str = "graded",
+        quality: str = "epsilon",
+        closing: str = "adaptive",
+        preshape: str | None = None,
+        friction: float | None = None,
+        torsion: float = 0.0,
+        cones: Literal["polyhedral", "round"] = "round",
+        edges: int = 8,
+        convention: Literal["normal_unit", "unit_magnitude"] = "normal_unit",
+        task: ArrayLike | None = None,
+        depth: float = DEPTH,
+        collision: str = "penalty",
+        object_pose: Pose | None = None,
+    ):
+        if contact not in CONTACT_MODELS:
+            raise unknown_name("contact model", contact, CONTACT_MODELS)
+        if collision not in COLLISIONS:
+            raise unknown_name("worth of a collision", collision, COLLISIONS)
+        if closing not in CLOSING_MODES:
+            raise unknown_name("closing", closing, CLOSING_MODES)
+        self.hand: Final[Hand] = hand_named(hand) if isinstance(hand, str) else hand
+        self.object: Final[GraspObject] = shipped_object(obj) if isinstance(obj, str) else obj
+        self.contact: Final = contact
+        self.quality: Final = quality
+        self.closing: Final = closing
+        preshape_of(self.hand, preshape)
+        self.preshape: Final = preshape or next(iter(self.hand.preshapes))
+        self.collision: Final = collision
+        self.friction: Final[float] = self.object.friction if friction is None else float(friction)
+        self.measure: Final = Measure(
+            quality, self.object, self.friction, float(torsion), edges, cones, convention, task
+        )
+        if not 0.0 < depth <= 0.008:
+            raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.008 m.")
+        self.depth: Final[float] = float(depth)
+        self.object_pose: Final[Pose] = Pose() if object_pose is None else object_pose
+        if not np.all(np.isfinite([*self.object_pose.position, *self.object_pose.quaternion])):
+            raise InputError(f"object_pose {object_pose} is not finite; give finite numbers.")
+        self.field: Final[DistanceField] = self._field()
+        self._reach: Final[Array] = self.hand.reach()
+        self._samples: Final[Array] = skin_samples(self.hand)
+        self._no_contacts: Final = as_contacts(np.empty((0, 8)), self.hand)
+
+    def grasp(self, pose: Pose, s1: float = 0.0) -> Grasp:
+        """Close the hand at a pose of its palm in the world with posture s1 [rad]; a bad grasp has quality 0.
+
+        Raises
+        ------
+        InputError
+            If the pose or s1 is not finite.
+        """
+        if not np.isfinite(s1) or not np.all(np.isfinite([*pose.position, *pose.quaternion])):
+            raise InputError(f"pose {pose} with s1 = {s1!r} is not finite; give finite numbers.")
+        relative = self.object_pose.inverse() @ pose
+        motion = closing_motion(self.hand, float(s1), self.preshape)
+        geometry = self._place(relative)
+        opened = motion.joints(0.0)
+        depths = np.maximum(-self.gaps(relative, opened, geometry), 0.0)
+        penetration = float(depths.max())
+        if penetration > 0.0:
+            worth = self._collision(float(depths.sum()))
+            return Grasp("initial collision", worth, relative, s1, opened, opened, self._no_contacts, (), penetration)
+        closed = self._close(geometry, motion)
+        contacts = self._contacts(geometry, motion, closed)
+        touching = tuple(dict.fromkeys(self.hand.body_name(int(body)) for body in np.flatnonzero(closed.touched)))
+        if len(contacts) < 2:
+            return Grasp("no contact", 0.0, relative, s1, closed.joints, opened, contacts, touching, 0.0)
+        wrench = self.measure.wrench(contacts)
+        status: Status = "ok" if wrench.force_closure else "not closed"
+        worth = float(self.measure.value(contacts, wrench))
+        return Grasp(status, worth, relative, s1, closed.joints, opened, contacts, touching, 0.0, wrench)
+
+    def gaps(self, pose: Pose, joints: ArrayLike, geometry: _Geometry | None = None) -> Array:
+        """Return the gaps (f j + 1,) between the object and the hand's bodies at rest [m], the palm last.
+
+        Negative values are rough depths; gaps above 5 mm are lower bounds.
+
+        Parameters
+        ----------
+        pose
+            From the palm frame to the object's frame.
+        joints
+            Joint angles or shifts, (f, j) [rad or m].
+        """
+        placed = self._place(pose) if geometry is None else geometry
+        angles = np.ascontiguousarray(joints, dtype=np.float64)
+        ends = link_ends(placed.bases, self.hand.chains, angles)
+        return hand_gaps(
+            self.field.nodes,
+            self.field.frame,
+            ends,
+            self.hand.radii,
+            placed.palms,
+            self.hand.palm_half_extents,
+            self.hand.palm_roundings,
+            0.005,
+        )
+
+    def warm_up(self) -> None:
+        """Compile what a trial needs, if it is not yet in the cache: some seconds once for an installation."""
+        half = self.object.box_half_extents
+        beside = Pose((float(-self.hand.grasp_center[0]), 0.0, float(self.object.box_center[2] - half[2] - 0.05)))
+        motion = closing_motion(self.hand, 0.0, self.preshape)
+        geometry = self._place(beside)
+        closed = self._close(geometry, motion)
+        self.gaps(beside, closed.joints, geometry)
+        closed.touched[3] = True
+        self._skin(geometry, closed.joints)
+        self._touch(geometry, closed)
+        points = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
+        self.measure.wrench(Contacts(points, -points, np.ones(4), np.arange(4), ("",) * 4))
+
+    def scene(self, grasp: Grasp, opened: bool = False) -> "Scene":
+        """Return the meshes and contacts of a grasp in the world; with `opened`, of the hand before it closes."""
+        from surehold.grasping.pictures.scene import grasp_scene  # pictures stand on grasps, not the other way round
+
+        return grasp_scene(self, grasp, opened)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "field"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # In a worker process the distance field is read from the cache, not sent along.
+        self.__dict__.update(state)
+        self.__dict__["field"] = self._field()
+
+    def _field(self) -> DistanceField:
+        needed = float(self.hand.radii.max()) + self.depth + 0.001  # a link is felt from its axis
+        return distance_field_of(self.object, margin=max(MARGIN, np.ceil(1e3 * needed) * 1e-3))
+
+    def _collision(self, depth: float) -> float:
+        """Return the worth of an open hand whose bodies are inside the object by `depth` together [m]."""
+        return _PENALTY * np.expm1(-depth / _PENALTY_DEPTH) if self.collision == "penalty" else 0.0
+
+    def _place(self, pose: Pose) -> _Geometry:
+        r, p = pose.rotation, np.asarray(pose.position)
+        bases = np.concatenate(
+            [r @ self.hand.bases[:, :, :3], (self.hand.bases[:, :, 3] @ r.T + p)[:, :, None]], axis=2
+        )
+        palms = np.concatenate(
+            [r @ self.hand.palm_poses[:, :, :3], (self.hand.palm_poses[:, :, 3] @ r.T + p)[:, :, None]], axis=2
+        )
+        return _Geometry(np.ascontiguousarray(bases), np.column_stack([r, p]), np.ascontiguousarray(palms))
+
+    def _close(self, geometry: _Geometry, motion: ClosingMotion, stop: Array | None = None) -> Closed:
+        return Closed(
+            *close_hand(
+                self.field.nodes,
+                self.field.frame,
+                geometry.bases,
+                self.hand.chains,
+                self._reach,
+                np.stack(motion),
+                self.hand.radii,
+                geometry.palms,
+                self.hand.palm_half_extents,
+                self.hand.palm_roundings,
+                self.closing == "adaptive",
+                CLOSED,
+                self.depth if self.contact == "graded" else 0.0,
+                np.full(self.hand.radii.shape, np.inf) if stop is None else stop,
+            )
+        )
+
+    def _contacts(self, geometry: _Geometry, motion: ClosingMotion, closed: Closed) -> Contacts:
+        if self.contact == "single":
+            return as_contacts(self._touch(geometry, closed), self.hand)
+        rows = self._skin(geometry, closed.joints)
+        if self.contact == "graded":
+            bodies = self._samples[:, 0]
+            joints = self.hand.radii.shape[1]
+            for f in range(len(self.hand.radii)):
+                branches = self._branches(geometry, motion, closed, f, 0.0)
+                if len(branches) > 1:
+                    mine = (bodies >= joints * f) & (bodies < joints * (f + 1))
+                    rows[mine] = blended([(share, self._skin(geometry, angles)[mine]) for share, angles in branches])
+        return as_contacts(rows, self.hand)
+
+    def _branches(
+        self, geometry: _Geometry, motion: ClosingMotion, closed: Closed, finger: int, after: float
+    ) -> list[tuple[float, Array]]:
+        """Return share and joint angles of each outcome of a finger: held where a link brushes past, or gone on."""
+        branches: list[tuple[float, Array]] = []
+        left = 1.0
+        per_finger = self.hand.radii.shape[1]
+        links = range(per_finger * finger, per_finger * (finger + 1))
+        for time, link in sorted(
+            (float(closed.pass_time[b]), b) for b in links if after < closed.pass_time[b] < CLOSED
+        ):
+            share = left * pass_share(float(closed.pass_gap[link]), float(closed.pass_leave[link]), self.depth)
+            if share < _LEAST_SHARE:
+                continue
+            stop = np.full(self.hand.radii.shape, np.inf)
+            stop[finger, : (link % per_finger + 1 if self.closing == "adaptive" else per_finger)] = time
+            held = self._close(geometry, motion, stop)
+            branches += [(share * s, joints) for s, joints in self._branches(geometry, motion, held, finger, time)]
+            left -= share
+        return [*branches, (left, closed.joints)]
+
+    def _touch(self, geometry: _Geometry, closed: Closed) -> Array:
+        ends = link_ends(geometry.bases, self.hand.chains, closed.joints)
+        return touch_contacts(self.field.nodes, self.field.frame, ends, closed.touched, self.hand.radii)
+
+    def _skin(self, geometry: _Geometry, joints: Array) -> Array:
+        return skin_contacts(
+            self.field.nodes,
+            self.field.frame,
+            link_frames(geometry.bases, self.hand.chains, joints),
+            self.hand.chains,
+            self.hand.radii,
+            geometry.palm,
+            self._samples,
+            self.depth,
+            SKIN,
+            self.contact == "graded",
+        )

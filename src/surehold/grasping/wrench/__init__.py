@@ -1,0 +1,1 @@
+"""How well contacts resist disturbances: wrenches, their hull, quality measures."""

@@ -1,0 +1,1 @@
+"""The largest ball in the convex hull of wrenches."""

@@ -1,0 +1,215 @@
+"""The largest origin-centered ball in a convex hull of wrenches, the hull's distance and its volume.
+
+Notation
+--------
+w        wrenches whose convex hull H is measured, (m, 6); round contacts may be in H beside them
+h(u)     support function of H, for a unit vector u (6,)
+epsilon  radius of the largest ball about the origin in H: min of h(u) over u, 0 if that is negative
+
+Distances below 1e-11 of the largest wrench are exactly 0. epsilon comes from the compiled expansion of the nearest
+facet. Should rounding spoil that, as wrenches apart by about that tolerance can, it is repeated with a coarser
+tolerance; should that fail too, the full hull of joggled wrenches (Qhull) decides, or for round cones the bounds
+reached so far. Numerical failure is never scored as 0.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.errors import InputError
+from surehold.grasping.wrench.friction_cones import RoundContacts, finite_array
+from surehold.grasping.wrench.hull.nearest_facet import DONE, FAILED, FLAT, OUTSIDE, SPENT, expand_nearest
+
+__all__ = ["InscribedBall", "ball_radius", "hull_volume", "inscribed_ball", "nearest_point"]
+
+TOLERANCES = (1e-11, 1e-9)
+"""Tried in turn: distances below this fraction of the largest wrench count as zero."""
+ROUND_TOLERANCES = (1e-11, 1e-9, 1e-7)
+"""The same for round cones, which Qhull cannot take."""
+FACET_BUDGETS = (4096, 65_536, 1_048_576)
+"""Memory for so many facets is tried in turn; grasps need hundreds to thousands."""
+ROUND_FACET_BUDGETS = (16_384, 65_536)
+"""The same for round cones, which need more and, stopped, are bounded all the same."""
+MAX_WRENCHES = 65_535  # the compiled expansion packs four indices of wrenches into 64 bits
+ROUND_GAP = 1e-9
+"""Difference of the bounds at which round cones count as measured, as a fraction of the largest wrench.
+
+Perfectly symmetric contacts around an axis, whose weakest directions form a continuum, end at about 1e-3.
+"""
+
+_NO_ROUND = RoundContacts(np.zeros((0, 6)), np.zeros((0, 6, 3)))
+
+
+class InscribedBall(NamedTuple):
+    """The largest origin-centered ball in a convex hull of wrenches, and how it was found."""
+
+    signed: float
+    """Radius; exactly 0 on the boundary or in a flat hull; outside, minus the distance from origin to hull."""
+    lower: float
+    """Certified lower bound of the radius: the nearest facet of an inscribed polytope; 0 if there is no ball."""
+    upper: float
+    """Certified upper bound of the radius: h(normal); 0 if there is no ball."""
+    normal: NDArray[np.float64]
+    """Unit vector in which the hull resists least, (6,); zero if the hull is flat and holds the origin."""
+    expansions: int
+    """Wrenches added after the first seven."""
+    facets: int
+    """Facets made on the way."""
+    fallbacks: int
+    """0: as planned; else how often rounding spoiled the expansion: a coarser tolerance helps, or the full hull."""
+
+    @property
+    def radius(self) -> float:
+        """The radius, 0 where there is no ball."""
+        return max(self.signed, 0.0)
+
+
+def ball_radius(wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None) -> float:
+    """Return epsilon of wrenches (m, 6), which must be finite; the fast path, nothing else is computed or checked.
+
+    With round contacts, their cone edges (any number of edges, 4 will do) must be among the wrenches.
+    """
+    status, lower, upper, *_ = _expand(wrenches, round_contacts)
+    if status == FAILED:
+        return _ball_from_hull(wrenches)[0]
+    return 0.0 if status != DONE else upper if round_contacts is None else lower
+
+
+def inscribed_ball(wrenches: ArrayLike, round_contacts: RoundContacts | None = None) -> InscribedBall:
+    """Return the largest origin-centered ball in the hull of wrenches (m, 6), signed, with bounds and diagnostics.
+
+    Round contacts as in `ball_radius`. Raises InputError if the wrenches are not finite, not of shape (m, 6), or
+    more than 65,535.
+    """
+    w = finite_array("wrenches", wrenches, (None, 6))
+    status, lower, upper, normal, expansions, facets, fallbacks = _expand(w, round_contacts)
+    if status == FAILED:
+        lower, normal = _ball_from_hull(w)
+        upper = lower if round_contacts is None else max(lower, _round_support(normal, round_contacts))
+        status = DONE if lower > 0.0 else OUTSIDE
+    if status == DONE:
+        signed = upper if round_contacts is None else lower
+        return InscribedBall(signed, lower, upper, normal, expansions, facets, fallbacks)
+    nearest = nearest_point(w, round_contacts) if len(w) else np.zeros(6)
+    distance = float(np.sqrt(nearest @ nearest))
+    if distance > 0.0:
+        upper, normal = 0.0, -nearest / distance
+    return InscribedBall(-distance if distance else 0.0, 0.0, max(upper, 0.0), normal, expansions, facets, fallbacks)
+
+
+def nearest_point(wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None) -> NDArray[np.float64]:
+    """Return the point of the hull of wrenches (m, 6), m >= 1, nearest to the origin; exactly 0 if that is inside.
+
+    Wolfe 1976, "Finding the nearest point in a polytope": keep a corral of few wrenches whose convex hull holds the
+    point of their affine hull nearest to the origin; add the wrench that lies farthest towards the origin from there;
+    drop those whose weight turns negative.
+    """
+    centers, axes = round_contacts or _NO_ROUND
+    scale = _largest(wrenches)
+    stop = scale * (ROUND_GAP if len(centers) else TOLERANCES[0])
+    corral = wrenches[[np.argmin(np.sum(wrenches**2, axis=1))]]
+    weights = np.ones(1)
+    x = corral[0]
+    for _ in range(1000):
+        length = np.sqrt(x @ x)
+        if length <= stop:
+            return np.zeros(6)
+        u = x / length
+        added = wrenches[np.argmin(wrenches @ u)]
+        if len(centers):
+            components = np.einsum("j,ijk->ik", u, axes)
+            depths = np.sqrt(np.sum(components**2, axis=1))
+            i = int(np.argmin(centers @ u - depths))
+            if centers[i] @ u - depths[i] < added @ u and depths[i] > 0.0:
+                added = centers[i] - axes[i] @ components[i] / depths[i]
+        if length - added @ u <= stop or (corral == added).all(axis=1).any():
+            break
+        corral = np.vstack((corral, added))
+        weights = np.append(weights, 0.0)
+        while len(corral) > 1:
+            rest = np.linalg.lstsq((corral[1:] - corral[0]).T, -corral[0], rcond=1e-13)[0]
+            target = np.concatenate(([1.0 - rest.sum()], rest))
+            falling = (target <= 1e-13) & (weights > target)
+            if not falling.any():
+                weights = target
+                break
+            step = np.min(weights[falling] / (weights[falling] - target[falling]))
+            weights = weights + step * (target - weights)
+            kept = weights > 1e-13
+            if kept.all() or not kept.any():
+                return x
+            corral, weights = corral[kept], weights[kept]
+        x = weights @ corral / weights.sum()
+    return x
+
+
+def hull_volume(wrenches: ArrayLike) -> float:
+    """Return the volume of the convex hull of points (m, k), exactly 0 if they lie in a hyperplane (Qhull)."""
+    from scipy.spatial import ConvexHull
+
+    w = np.asarray(wrenches, float)
+    if len(w) <= w.shape[1]:
+        return 0.0
+    u, spread, _ = np.linalg.svd(w - w.mean(axis=0), full_matrices=False)
+    if spread[-1] <= TOLERANCES[0] * spread[0]:
+        return 0.0
+    # Qhull joggles points by a fraction of their largest coordinate, so give it equal widths in all directions
+    return float(ConvexHull(u, qhull_options="QJ Pp").volume * np.prod(spread))
+
+
+def _expand(
+    w: NDArray[np.float64], round_contacts: RoundContacts | None
+) -> tuple[int, float, float, NDArray[np.float64], int, int, int]:
+    """Run `expand_nearest` with the memory and tolerance it needs; its result, and the fallbacks.
+
+    The status is DONE if there is a ball, FLAT or OUTSIDE if not, FAILED if the full hull must decide.
+    """
+    flat = np.zeros(6)
+    if len(w) < 7:
+        return FLAT, 0.0, 0.0, flat, 0, 0, 0
+    if len(w) > MAX_WRENCHES:
+        raise InputError(f"{len(w)} wrenches are too many, {MAX_WRENCHES} can be measured; merge contacts.")
+    w = np.array(w, np.float64, order="C")  # other layouts and read-only arrays would be compiled for anew
+    centers, axes = (np.array(a, np.float64, order="C") for a in round_contacts or _NO_ROUND)
+    gap = ROUND_GAP if len(centers) else 0.0
+    budgets = ROUND_FACET_BUDGETS if len(centers) else FACET_BUDGETS
+    tolerances = ROUND_TOLERANCES if len(centers) else TOLERANCES
+    best = FAILED, 0.0, 0.0, flat, 0, 0, len(tolerances)
+    for fallbacks, tolerance in enumerate(tolerances):
+        result = expand_nearest(w, centers, axes, tolerance, gap, budgets[0])
+        for budget in budgets[1:]:
+            if result[0] != SPENT:
+                break
+            result = expand_nearest(w, centers, axes, tolerance, gap, budget)
+        status, lower, upper, normal, expansions, facets = result
+        if status == SPENT and len(centers):
+            status = DONE  # the bounds hold, they are only wider apart
+        if status == DONE and lower <= tolerance * _largest(w):
+            status = OUTSIDE
+        if status in (DONE, FLAT, OUTSIDE):
+            return status, lower, upper, normal, expansions, facets, fallbacks
+        if len(centers) and lower > max(best[1], tolerance * _largest(w)):
+            best = DONE, lower, upper, normal, expansions, facets, len(tolerances)
+    return best
+
+
+def _ball_from_hull(w: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return (radius, normal of the nearest facet) by the full hull; accurate to Qhull's joggle, about 1e-10."""
+    from scipy.spatial import ConvexHull
+
+    equations = ConvexHull(w, qhull_options="QJ Pp").equations
+    nearest = int(np.argmax(equations[:, -1]))
+    radius = -float(equations[nearest, -1])
+    return (radius if radius > 1e-9 * _largest(w) else 0.0), equations[nearest, :-1].copy()  # joggled zero is zero
+
+
+def _round_support(u: NDArray[np.float64], round_contacts: RoundContacts) -> float:
+    """Return h(u) of round contacts."""
+    centers, axes = round_contacts
+    return float(np.max(centers @ u + np.sqrt(np.sum(np.einsum("j,ijk->ik", u, axes) ** 2, axis=1))))
+
+
+def _largest(w: NDArray[np.float64]) -> float:
+    """Return the norm of the largest wrench."""
+    return float(np.sqrt(np.max(np.einsum("ij,ij->i", w, w))))

@@ -1,0 +1,122 @@
+"""What a grasp is worth: the measures by name, each a number from contacts.
+
+All measure wrenches that contacts can apply while the normal forces of all together sum to at most one (L1). Torques
+are about the object's center of mass, divided by half the longest edge of its box, so that all six components of a
+wrench are in units of force. H is the convex hull of the contacts' wrenches, h(u) its support function, t a wrench.
+
+| name             | formula                                          | unit    | range    | 0 means
+|------------------|--------------------------------------------------|---------|----------|------------------------
+| `epsilon`        | max(0, min over unit u of h(u))                  | force   | >= 0     | some wrench not resisted
+| `signed_epsilon` | the same; outside minus the distance from 0 to H | force   | any      | on the border of closure
+| `volume`         | volume of H in six dimensions, 0 without closure | force^6 | >= 0     | some wrench not resisted
+| `simox`          | as the simulator of the thesis, see simox.py     | none    | >= 0     | fewer than 2 contacts
+| `task`           | min over t of the largest s with -s t in H       | none    | >= 0     | some t not resisted
+| `closure`        | 1 in force closure, else 0, by linear program    | none    | 0 or 1   | no force closure
+
+epsilon: Ferrari and Canny 1992; task: Li and Sastry 1988. Of the task, gravity in 14 directions is the default: the
+quality is then the weight that is held however the hand is turned, divided by the sum of the normal forces.
+Round cones are the default. Cones of eight edges underrate epsilon by a few percent on average and by more where few
+contacts hold, and their value depends on where the edges point; round ones cost about a millisecond more. Their
+epsilon is a certified lower bound, `WrenchQuality.upper` the upper one.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.errors import InputError, unknown_name
+from surehold.grasping.closing.contacts import Contacts
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.wrench.force_closure import force_closure, gravity_wrenches, task_quality
+from surehold.grasping.wrench.friction_cones import CONVENTIONS, Convention, finite_array
+from surehold.grasping.wrench.simox import ObjectWrenchSpace, object_wrench_space, simox_quality
+from surehold.grasping.wrench.wrench_space import CONES, WrenchQuality, wrench_quality
+
+__all__ = ["GRAVITY_DIRECTIONS", "QUALITIES", "Measure"]
+
+QUALITIES: Final = ("epsilon", "signed_epsilon", "volume", "simox", "task", "closure")
+
+_SIGNS = np.array([s for s in product((-1.0, 0.0, 1.0), repeat=3) if abs(s[0]) + abs(s[1]) + abs(s[2]) in (1.0, 3.0)])
+#: Towards the faces and the corners of a cube, (14, 3).
+GRAVITY_DIRECTIONS: Final = _SIGNS / np.linalg.norm(_SIGNS, axis=1)[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class Measure:
+    """One measure of the contacts on one object.
+
+    Raises InputError if a name is unknown or a number out of range.
+    """
+
+    name: str  #: one of `QUALITIES`
+    obj: GraspObject
+    friction: float  #: coefficient of friction
+    torsion: float = 0.0  #: torsional friction of soft fingers: moment about the normal by normal force [m]
+    edges: int = 8  #: of polyhedral cones, and of the volume
+    cones: Literal["polyhedral", "round"] = "round"
+    convention: Convention = "normal_unit"  #: or "unit_magnitude"
+    task: ArrayLike | None = None  #: (k, 6) external force [N] and torque about the center of mass [N m] of each wrench
+
+    def __post_init__(self) -> None:
+        if self.name not in QUALITIES:
+            raise unknown_name("quality measure", self.name, QUALITIES)
+        if self.cones not in CONES:
+            raise unknown_name("cones", self.cones, CONES)
+        if self.convention not in CONVENTIONS:
+            raise unknown_name("convention", self.convention, CONVENTIONS)
+        if not 0.0 <= self.friction <= 10.0:
+            raise InputError(f"friction is {self.friction!r}; give a number from 0 to 10, such as 0.5.")
+        if not (np.isfinite(self.torsion) and 0.0 <= self.torsion < 0.1):
+            raise InputError(f"torsion is {self.torsion!r} m; give a length from 0 to 0.1 m, such as 0.001.")
+        if isinstance(self.edges, bool) or not isinstance(self.edges, int | np.integer) or self.edges < 3:
+            raise InputError(f"edges of the friction cone are {self.edges!r}; give an integer of 3 or more, such as 8.")
+        if self.task is not None and self.name != "task":
+            raise InputError(f"a task is given, but the quality is {self.name!r}; ask for quality='task'.")
+        self._task_wrenches  # noqa: B018  # a bad task is refused at once
+
+    def wrench(self, contacts: Contacts) -> WrenchQuality:
+        """Return epsilon with its bounds and what else belongs to it."""
+        return wrench_quality(
+            contacts.points,
+            contacts.normals,
+            friction=self.friction,
+            edges=self.edges,
+            torque_length=self.obj.torque_length,
+            origin=self.obj.center_of_mass,
+            convention=self.convention,
+            weights=contacts.weights,
+            torsion=self.torsion,
+            cones=self.cones,
+        )
+
+    def value(self, contacts: Contacts, wrench: WrenchQuality) -> float:
+        """Return the measure of at least two contacts, whose `wrench` is given."""
+        if self.name == "signed_epsilon":
+            return wrench.signed_epsilon
+        if self.name == "simox":
+            return simox_quality(contacts.points, contacts.normals, self._object_space)
+        if self.name == "task":
+            return task_quality(wrench.wrenches, self._task_wrenches)
+        if self.name == "closure":
+            return float(force_closure(wrench.wrenches))
+        if self.name == "volume":
+            return wrench.volume if wrench.force_closure else 0.0
+        return wrench.epsilon
+
+    @cached_property
+    def _object_space(self) -> ObjectWrenchSpace:
+        return object_wrench_space(self.obj.vertices, self.obj.faces)
+
+    @cached_property
+    def _task_wrenches(self) -> NDArray[np.float64]:
+        if self.task is None:
+            center = self.obj.center_of_mass
+            return gravity_wrenches(1.0, center, GRAVITY_DIRECTIONS, self.obj.torque_length, center)
+        wrenches = finite_array("task", self.task, (None, 6))
+        if not np.any(wrenches):
+            raise InputError("task must hold at least one external wrench that is not zero, shape (k, 6).")
+        return np.hstack((wrenches[:, :3], wrenches[:, 3:] / self.obj.torque_length))

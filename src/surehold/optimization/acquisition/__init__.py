@@ -1,0 +1,1 @@
+"""What a trial is worth: the formulas, what they are averaged over, and where a trial tells most."""

@@ -1,0 +1,148 @@
+"""What is asked of the outcome under input noise, where its mean is not what matters.
+
+Legend
+    draws     joint draws of f at the perturbed points of a query, (..., s)
+    weights   w_i of the perturbations, (s,), positive, summing to 1
+    rho       risk measure of one draw, larger is better; its distribution over draws is what the model knows of it
+    alpha     share of the worst outcomes that counts, in (0, 1)
+    beta      standard deviations taken off the mean, or added to and taken off the model's mean in the worst case
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError, unknown_name
+from surehold.optimization.maximizer.ascent import by_differences
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.surrogates.protocol import Posterior
+
+__all__ = ["RISKS", "Risk", "RiskImprovement", "WorstCaseBound"]
+
+RISKS: Final = ("mean", "mean-std", "var", "cvar", "worst")
+_DRAWS: Final = 16  # joint draws a particle; common random numbers make the criterion a smooth function of the query
+
+
+@dataclass(frozen=True)
+class Risk:
+    """A risk measure of the outcome under input noise.
+
+    "mean": the expected outcome. "mean-std": mean - beta standard deviations. "var": value at risk, the outcome that a
+    share alpha of executions falls below. "cvar": the mean of that share (Rockafellar and Uryasev 2000). "worst": the
+    lowest outcome among the perturbations (after Bogunovic et al. 2018).
+    """
+
+    name: str = "mean"
+    alpha: float = 0.1
+    beta: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.name not in RISKS:
+            raise unknown_name("risk", self.name, RISKS)
+        if not 0.0 < self.alpha < 1.0:
+            raise InputError(f"alpha is {self.alpha!r}; give the share of worst outcomes, strictly between 0 and 1.")
+        if not (np.isfinite(self.beta) and self.beta >= 0.0):
+            raise InputError(f"beta is {self.beta!r}; give a finite number of standard deviations, 0 or more.")
+
+    def measure(self, draws: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return rho (...) of draws (..., s)."""
+        if self.name == "worst":
+            return draws.min(axis=-1)
+        mean = draws @ weights
+        if self.name == "mean":
+            return mean
+        if self.name == "mean-std":
+            return mean - self.beta * np.sqrt(np.maximum(np.square(draws - mean[..., None]) @ weights, 0.0))
+        order = np.argsort(draws, axis=-1)
+        ordered = np.take_along_axis(draws, order, axis=-1)
+        reached = np.cumsum(weights[order], axis=-1)
+        if self.name == "var":
+            first = np.argmax(reached >= self.alpha - 1e-12, axis=-1)
+            return np.take_along_axis(ordered, first[..., None], axis=-1)[..., 0]
+        share = np.clip(
+            self.alpha - (reached - weights[order]), 0.0, weights[order]
+        )  # of the worst alpha, point by point
+        return (ordered * share).sum(axis=-1) / self.alpha
+
+
+class RiskImprovement:
+    """Expected improvement of a risk measure, by joint draws of the posterior around each query.
+
+    Parameters
+    ----------
+    posterior, perturbations, risk
+        The surrogate, the input noise, what is asked of the outcome.
+    best
+        Value to improve upon.
+    rng
+        For the common random numbers of the draws.
+    """
+
+    def __init__(
+        self,
+        posterior: Posterior,
+        perturbations: Perturbations,
+        risk: Risk,
+        best: float,
+        rng: np.random.Generator,
+    ):
+        self._posterior = posterior
+        self._perturbations = perturbations
+        self._risk = risk
+        self._best = best
+        self._normals = rng.standard_normal((_DRAWS, len(perturbations.quadrature.weights)))
+
+    def values(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return draws of the risk measure (m b, q) at U (q, d)."""
+        draws = self._posterior.sample(self._perturbations.around(U), self._normals)  # (m, q, b, s)
+        rho = self._risk.measure(draws, self._perturbations.quadrature.weights)
+        return np.swapaxes(rho, 1, 2).reshape(-1, len(U))
+
+    def expectation(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the expected risk measure (q,) at U (q, d)."""
+        return self.values(U).mean(axis=0)
+
+    def __call__(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the expected improvement (q,); where no draw improves, how near the best one comes (negative)."""
+        rho = self.values(U)
+        gain = np.maximum(rho - self._best, 0.0).mean(axis=0)
+        return np.where(gain > 0.0, gain, np.minimum(rho.max(axis=0) - self._best, 0.0))
+
+    def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return values (q,) and gradients (q, d) at U (q, d), by central differences on common random numbers."""
+        return by_differences(self, U)
+
+
+class WorstCaseBound:
+    """Upper confidence bound of the worst outcome among the perturbations: min_i mean + kappa std at x + xi_i.
+
+    Bogunovic, Scarlett, Jegelka and Cevher 2018, StableOpt: the candidate has the highest bound, the trial is made
+    where its lower bound is lowest.
+    """
+
+    def __init__(self, posterior: Posterior, perturbations: Perturbations, kappa: float):
+        self._posterior = posterior
+        self._perturbations = perturbations
+        self._kappa = kappa
+
+    def __call__(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the bound (q,) at U (q, d)."""
+        return self._bounds(U, self._kappa).min(axis=1)
+
+    def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the bounds (q,) and their gradients (q, d) at U (q, d), by central differences."""
+        return by_differences(self, U)
+
+    def weakest(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the perturbed points (s, d) of u (d,), inside the cube, the one with the lowest lower bound first."""
+        points = self._perturbations.around(u[None, :])[0]
+        lower = self._bounds(u[None, :], -self._kappa)[0]
+        return np.clip(points[np.argsort(lower, kind="stable")], 0.0, 1.0)
+
+    def _bounds(self, U: NDArray[np.float64], kappa: float) -> NDArray[np.float64]:
+        moments, _ = self._perturbations.spread(self._posterior, U)
+        mean = moments.mean.mean(axis=0)
+        variance = moments.variance.mean(axis=0) + moments.mean.var(axis=0)
+        return (mean + kappa * np.sqrt(variance)).reshape(len(U), -1)

@@ -1,0 +1,1 @@
+"""Finding the highest point of an acquisition function over the unit cube."""

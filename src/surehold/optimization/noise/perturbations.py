@@ -1,0 +1,109 @@
+"""Where a commanded input may end up: a quadrature of the input noise, and the rule at the border of the box.
+
+Legend
+    U        queries in the unit cube, (q, d)
+    offsets  perturbations xi_i, (s, d), or (q, s, d) where the border makes them differ from query to query
+    weights  w_i, (s,), summing to 1
+    g(x)     outcome under the input noise, E f(x + noise), about sum_i w_i f(x + xi_i)      [UO, thesis (3.21)]
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError, unknown_name
+from surehold.optimization.box import Box
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.quadratures import Quadrature, exact, quadrature
+from surehold.optimization.surrogates.gaussian_process.closed_form import closed_form
+from surehold.optimization.surrogates.protocol import Moments, Posterior
+
+__all__ = ["BORDERS", "Perturbations"]
+
+BORDERS: Final = ("extend", "clip", "keep")
+
+
+@dataclass(frozen=True)
+class Perturbations:
+    """Weighted perturbations of an input, and what happens to those that leave the box.
+
+    The rule at the border: "extend" lets the model be evaluated outside the box; "clip" moves a coordinate that left
+    back to the border; "keep" gives it its noise-free value, as the thesis scores its runs.
+    """
+
+    quadrature: Quadrature
+    """of the noise itself; of standard normal variables where `root` scales them"""
+    border: str = "extend"
+    root: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
+    """for noise that varies: points (q, d) -> roots of the covariances there, (q, d, d)"""
+    covariance: NDArray[np.float64] | None = None
+    """(d, d) where outcomes are computed in closed form; the quadrature then serves everything else"""
+
+    def __post_init__(self) -> None:
+        if self.border not in BORDERS:
+            raise unknown_name("border rule", self.border, BORDERS)
+
+    @classmethod
+    def of(
+        cls,
+        noise: InputNoise | None,
+        box: Box,
+        rule: str,
+        border: str = "extend",
+        *,
+        k: float = 1.0,
+        exponent: int = 5,
+    ) -> "Perturbations":
+        """Return the perturbations of an input noise by a quadrature rule; None is no noise."""
+        if noise is None:
+            return cls(exact(box.dimension), border)
+        covariance = noise.unit_covariance(box)
+        if rule == "closed_form":
+            if noise.bounded or noise.varies or border != "extend":
+                raise InputError(
+                    "the quadrature 'closed_form' is for Gaussian noise that is the same everywhere and the border "
+                    "rule 'extend'; choose another quadrature."
+                )
+            return cls(quadrature("quasi_monte_carlo", covariance), border, None, covariance)
+        if not noise.varies:
+            return cls(quadrature(rule, covariance, k, bounded=noise.bounded, exponent=exponent), border)
+        standard = np.diag((np.diag(covariance) > 0.0).astype(np.float64))
+        return cls(quadrature(rule, standard, k, exponent=exponent), border, lambda U: noise.unit_roots(box, U))
+
+    def around(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the perturbed points (q, s, d) of U (q, d)."""
+        offsets, _ = self._at(U)
+        return U[:, None, :] + offsets
+
+    def outcome(self, posterior: Posterior, U: NDArray[np.float64], gradient: bool = False) -> Moments:
+        """Return the moments of g at U (q, d) under each particle."""
+        if self.covariance is not None:
+            return closed_form(posterior, U, self.covariance, gradient)
+        offsets, slopes = self._at(U)
+        return posterior.average(U, offsets, self.quadrature.weights, gradient, slopes)
+
+    def spread(
+        self, posterior: Posterior, U: NDArray[np.float64], gradient: bool = False
+    ) -> tuple[Moments, NDArray[np.float64] | None]:
+        """Return the moments of f at all perturbed points, query by query: (m, q s); and slopes (q, s, d)."""
+        offsets, slopes = self._at(U)
+        points = U[:, None, :] + offsets
+        return posterior.moments(points.reshape(-1, U.shape[1]), gradient), slopes
+
+    def _at(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """Return offsets, and the derivative of each perturbed coordinate by the query's (None: 1 everywhere)."""
+        offsets = self.quadrature.offsets
+        if self.root is not None:
+            offsets = np.einsum("qde,se->qsd", self.root(U), offsets)
+        if self.border == "extend":
+            return offsets, None
+        points = U[:, None, :] + offsets
+        inside = (points >= 0.0) & (points <= 1.0)
+        if inside.all():
+            return offsets, None
+        if self.border == "keep":
+            return np.where(inside, offsets, 0.0), None
+        return np.clip(points, 0.0, 1.0) - U[:, None, :], inside.astype(np.float64)

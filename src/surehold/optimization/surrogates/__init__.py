@@ -1,0 +1,1 @@
+"""Models of the response; each answers for its own observation noise."""

@@ -1,0 +1,161 @@
+"""Learning hyperparameters: their prior, the mode of their posterior, and slice-sampled particles.
+
+Legend: theta (p,) = log length-scales (d), then log signal variance and log noise variance where learnt, see
+`likelihood`. Particles are m equally likely draws of theta.
+"""
+
+from dataclasses import dataclass, fields
+from math import log
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError, unknown_name
+from surehold.optimization.samplers.elliptical_slice import elliptical_slice_sample
+from surehold.optimization.samplers.slice import slice_sample
+from surehold.optimization.surrogates.gaussian_process.likelihood import (
+    Evidence,
+    log_posterior,
+    log_posterior_and_gradient,
+)
+
+__all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "mode"]
+
+_STARTS = (-2.0, -1.0, 0.0, 1.0)  # common length-scale of the mode's first guesses, in prior standard deviations
+_CURVATURE_STEP = 0.05
+_NEAR = {"maxiter": 50, "ftol": 1e-5, "gtol": 1e-2}  # the mode guides a sampler: within 1e-3 of the top is enough
+_METHODS = ("elliptical_slice", "slice", "map")
+_REACH = 6.0  # the mode is sought within this many prior standard deviations
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Independent normal priors on the logarithms of the hyperparameters."""
+
+    log_length_scale: tuple[float, float]
+    """mean and standard deviation; length-scales in widths of the unit cube"""
+    log_signal_variance: tuple[float, float] = (0.0, 1.5)
+    """in squared standard deviations of the outputs"""
+    log_noise_variance: tuple[float, float] = (log(1e-2), 3.0)
+    """in squared standard deviations of the outputs"""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            mean, deviation = getattr(self, field.name)
+            if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
+                raise InputError(
+                    f"prior of {field.name} is ({mean}, {deviation}); give a mean and a positive deviation."
+                )
+
+    def vectors(self, d: int, signal: bool, noise: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return means and standard deviations (p,) of theta."""
+        rows = [self.log_length_scale] * d
+        rows += [self.log_signal_variance] * signal + [self.log_noise_variance] * noise
+        table = np.array(rows, dtype=np.float64)
+        return np.ascontiguousarray(table[:, 0]), np.ascontiguousarray(table[:, 1])
+
+
+@dataclass(frozen=True)
+class Learning:
+    """How the hyperparameters are learnt.
+
+    `method` "elliptical_slice" (default) and "slice" keep `particles` states of a slice sampler after `burn_in` steps,
+    one every `thin` steps; "map" keeps the mode alone. An elliptical step moves all hyperparameters together, starting
+    at the mode and guided by the curvature there. A step of "slice" (the thesis) moves one after the other, with a
+    first guess `width` of every slice's width; its chain starts at the last particle of the posterior before, or at
+    log theta = 1 where there is none.
+    """
+
+    method: Literal["elliptical_slice", "slice", "map"] = "elliptical_slice"
+    particles: int = 10
+    burn_in: int = 4
+    thin: int = 2
+    width: float = 6.0
+
+    def __post_init__(self) -> None:
+        if self.method not in _METHODS:
+            raise unknown_name("learning method", self.method, _METHODS)
+        for name, least in (("particles", 1), ("burn_in", 0), ("thin", 1)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+                raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
+        if not (np.isfinite(self.width) and self.width > 0.0):
+            raise InputError(f"width is {self.width!r}; give a positive finite number.")
+
+
+class Learnt(NamedTuple):
+    """Particles and what they cost."""
+
+    particles: NDArray[np.float64]
+    """(m, p)"""
+    evaluations: int
+    """evaluations of the density"""
+
+
+def learn(
+    evidence: Evidence, learning: Learning, rng: np.random.Generator, previous: NDArray[np.float64] | None = None
+) -> Learnt:
+    """Draw particles of the posterior of theta given the evidence.
+
+    `previous` (p,) is the last particle of the posterior before, from which "slice" goes on.
+    """
+    counts = {"keep": learning.particles, "burn_in": learning.burn_in, "thin": learning.thin}
+    if learning.method == "slice":
+        start = np.ones(evidence.prior_mean.size) if previous is None else previous
+        samples = slice_sample(log_posterior, evidence, start, rng, widths=learning.width, **counts)
+        return Learnt(samples.states, samples.evaluations)
+    center, evaluations = mode(evidence)
+    if learning.method == "map":
+        return Learnt(center[None, :], evaluations)
+    root = _root_of_covariance(evidence, center)
+    samples = elliptical_slice_sample(log_posterior, evidence, center, root, rng, **counts)
+    return Learnt(samples.states, evaluations + center.size + 1 + samples.evaluations)
+
+
+def _root_of_covariance(evidence: Evidence, center: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return R (p, p) such that R R' is about the covariance of theta, from the curvature at the mode (p,)."""
+    p = center.size
+    level = log_posterior_and_gradient(center, evidence)[1]
+    precision = np.empty((p, p))
+    for i in range(p):
+        step = np.zeros(p)
+        step[i] = _CURVATURE_STEP
+        precision[i] = (level - log_posterior_and_gradient(center + step, evidence)[1]) / _CURVATURE_STEP
+    deviation = evidence.prior_deviation
+    scaled = 0.5 * (precision + precision.T) * np.outer(deviation, deviation)
+    if not np.all(np.isfinite(scaled)):
+        return np.diag(deviation)
+    values, vectors = np.linalg.eigh(scaled)
+    return deviation[:, None] * vectors / np.sqrt(np.maximum(values, 1.0))  # nothing is wider than its prior
+
+
+def from_prior(evidence: Evidence, particles: int, rng: np.random.Generator) -> Learnt:
+    """Draw particles from the prior, for data that say nothing (equal outputs)."""
+    shape = (particles, evidence.prior_mean.size)
+    return Learnt(evidence.prior_mean + evidence.prior_deviation * rng.standard_normal(shape), 0)
+
+
+def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
+    """Return the mode of the log posterior (p,) and the number of evaluations it took.
+
+    Common length-scales on a coarse grid are tried first; the best one is refined by L-BFGS-B with the analytic
+    gradient.
+    """
+    from scipy.optimize import minimize
+
+    d = evidence.X.shape[1]
+    mean, deviation = evidence.prior_mean, evidence.prior_deviation
+    starts = np.repeat(mean[None, :], len(_STARTS), axis=0)
+    starts[:, :d] += np.outer(_STARTS, deviation[:d])
+    values = [log_posterior(start, evidence) for start in starts]
+    best = int(np.argmax(values))
+
+    def negative(theta: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        value, gradient = log_posterior_and_gradient(theta, evidence)
+        return (1e25, gradient) if value == -np.inf else (-value, -gradient)
+
+    bounds = list(zip(mean - _REACH * deviation, mean + _REACH * deviation, strict=True))
+    found = minimize(negative, starts[best], jac=True, method="L-BFGS-B", bounds=bounds, options=_NEAR)
+    theta = found.x if -found.fun > values[best] else starts[best]
+    return np.ascontiguousarray(theta), len(starts) + int(found.nfev)

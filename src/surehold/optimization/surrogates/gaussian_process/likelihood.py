@@ -1,0 +1,355 @@
+"""Log posterior density of Gaussian-process hyperparameters, weighted over blocks of data (compiled).
+
+Legend (the thesis' symbols in brackets)
+    X, y     inputs (n, d) in the unit cube, outputs (n,)
+    theta    hyperparameters (p,): log l_1 .. log l_d, then log s2 if learnt, then log v if learnt
+    l        length-scales (d,)
+    s2       signal variance                                        [sigma_p, used as a variance]
+    v        observation-noise variance, common to all observations
+    noise    known observation-noise variance of each observation (n,)
+    ratio    nugget as a fraction of the signal variance            [sigma_n, used as a ratio]
+    m2       prior variance of the constant mean, which is integrated out; 0 is a zero mean
+    A        covariance of the data: s2 (C + ratio I) + m2 11' + diag(noise) + v I, C the correlation matrix
+    L        lower Cholesky factor of A
+    blocks   slices of the observations, each an independent process with the same theta; block b has weight w_b  (3.11)
+
+    log p(y | X, theta) = -1/2 y' A^-1 y - log|L| - n/2 log 2 pi                        thesis (3.3); GPML algorithm 2.1
+    log posterior       = sum_b w_b log p(y_b | X_b, theta) + log prior(theta),  prior: independent normals on theta
+"""
+
+from math import exp, inf, log, pi, sqrt
+from typing import Final, NamedTuple
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import NDArray
+
+from surehold.optimization.surrogates.gaussian_process.kernels import along, correlation_and_factor, self_correlation
+
+__all__ = [
+    "Evidence",
+    "cholesky",
+    "log_posterior",
+    "log_posterior_and_gradient",
+    "solve_lower",
+    "solve_lower_transposed",
+]
+
+_LOG_2PI: Final = log(2.0 * pi)
+_LARGEST: Final = 60.0  # |theta| beyond this is outside every useful scale and would overflow
+
+
+class Evidence(NamedTuple):
+    """What the density of the hyperparameters depends on; plain arrays and numbers for compiled code."""
+
+    X: NDArray[np.float64]
+    """inputs, (n, d), C-contiguous"""
+    y: NDArray[np.float64]
+    """outputs, (n,)"""
+    noise: NDArray[np.float64]
+    """known observation-noise variances, (n,)"""
+    offsets: NDArray[np.int64]
+    """block b is the observations offsets[b] : offsets[b + 1], (b + 1,)"""
+    weights: NDArray[np.float64]
+    """weight of each block, (b,)"""
+    prior_mean: NDArray[np.float64]
+    """mean of the normal prior of each hyperparameter, (p,)"""
+    prior_deviation: NDArray[np.float64]
+    """its standard deviation, (p,)"""
+    signal_variance: float
+    """s2 where it is not learnt"""
+    ratio: float
+    """nugget as a fraction of s2"""
+    mean_variance: float
+    """prior variance of the constant mean"""
+    kernel: int
+    """number of the kernel"""
+    learn_signal: bool
+    """whether theta holds log s2"""
+    learn_noise: bool
+    """whether theta ends with log v"""
+
+    def first_block(self) -> "Evidence":
+        """Return the evidence of the first block alone, with weight 1."""
+        n = int(self.offsets[1])
+        if n == len(self.y):
+            return self
+        return self._replace(
+            X=self.X[:n], y=self.y[:n], noise=self.noise[:n], offsets=np.array([0, n]), weights=np.ones(1)
+        )
+
+
+EVIDENCE_TYPE: Final = types.NamedTuple(
+    (
+        types.float64[:, ::1],
+        types.float64[::1],
+        types.float64[::1],
+        types.int64[::1],
+        types.float64[::1],
+        types.float64[::1],
+        types.float64[::1],
+        types.float64,
+        types.float64,
+        types.float64,
+        types.int64,
+        types.boolean,
+        types.boolean,
+    ),
+    Evidence,
+)
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def cholesky(A):
+    """Overwrite the lower triangle of A (n, n) with its Cholesky factor; False if A is not positive definite.
+
+    Two columns at a time and four rows below them together: six loads from memory serve eight sums, where entry by
+    entry every sum would read both of its rows anew.
+    """
+    n = A.shape[0]
+    for j in range(0, n - 1, 2):
+        u, v = A[j], A[j + 1]
+        uu = uv = vv = 0.0
+        for k in range(j):
+            uu += u[k] * u[k]
+            uv += u[k] * v[k]
+            vv += v[k] * v[k]
+        pivot = u[j] - uu
+        if not pivot > 0.0:
+            return False
+        u[j] = sqrt(pivot)
+        first = 1.0 / u[j]
+        v[j] = (v[j] - uv) * first
+        between = v[j]
+        pivot = v[j + 1] - vv - between * between
+        if not pivot > 0.0:
+            return False
+        v[j + 1] = sqrt(pivot)
+        second = 1.0 / v[j + 1]
+        i = j + 2
+        while i + 4 <= n:
+            a, b, c, d = A[i], A[i + 1], A[i + 2], A[i + 3]
+            au = bu = cu = du = av = bv = cv = dv = 0.0
+            for k in range(j):
+                au += a[k] * u[k]
+                bu += b[k] * u[k]
+                cu += c[k] * u[k]
+                du += d[k] * u[k]
+                av += a[k] * v[k]
+                bv += b[k] * v[k]
+                cv += c[k] * v[k]
+                dv += d[k] * v[k]
+            a[j], b[j], c[j], d[j] = (a[j] - au) * first, (b[j] - bu) * first, (c[j] - cu) * first, (d[j] - du) * first
+            a[j + 1] = (a[j + 1] - av - a[j] * between) * second
+            b[j + 1] = (b[j + 1] - bv - b[j] * between) * second
+            c[j + 1] = (c[j + 1] - cv - c[j] * between) * second
+            d[j + 1] = (d[j + 1] - dv - d[j] * between) * second
+            i += 4
+        for row in range(i, n):
+            a = A[row]
+            au = av = 0.0
+            for k in range(j):
+                au += a[k] * u[k]
+                av += a[k] * v[k]
+            a[j] = (a[j] - au) * first
+            a[j + 1] = (a[j + 1] - av - a[j] * between) * second
+    if n % 2 == 1:
+        last = A[n - 1]
+        total = 0.0
+        for k in range(n - 1):
+            total += last[k] * last[k]
+        pivot = last[n - 1] - total
+        if not pivot > 0.0:
+            return False
+        last[n - 1] = sqrt(pivot)
+    return True
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def solve_lower(L, b):
+    """Overwrite b (n,) with L^-1 b."""
+    for i in range(b.size):
+        t = 0.0
+        for k in range(i):
+            t += L[i, k] * b[k]
+        b[i] = (b[i] - t) / L[i, i]
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def solve_lower_transposed(L, b):
+    """Overwrite b (n,) with L'^-1 b."""
+    for i in range(b.size - 1, -1, -1):
+        b[i] /= L[i, i]
+        t = b[i]
+        for k in range(i):
+            b[k] -= L[i, k] * t
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def invert_lower(L, inverse):
+    """Fill `inverse` (n, n) with the inverse of the lower triangular L (n, n), row by row from the rows above."""
+    inverse[:] = 0.0
+    for i in range(L.shape[0]):
+        diagonal = 1.0 / L[i, i]
+        row = inverse[i]
+        for k in range(i):
+            t = L[i, k] * diagonal
+            above = inverse[k]
+            for j in range(k + 1):
+                row[j] -= t * above[j]
+        row[i] = diagonal
+
+
+@njit(cache=True)
+def unpack(theta, evidence):
+    """Return (s2, v) of theta."""
+    d = evidence.X.shape[1]
+    s2, v = evidence.signal_variance, 0.0
+    position = d
+    if evidence.learn_signal:
+        s2 = exp(theta[position])
+        position += 1
+    if evidence.learn_noise:
+        v = exp(theta[position])
+    return s2, v
+
+
+@njit(cache=True)
+def data_covariance(X, noise, inverse_l, s2, v, ratio, mean_variance, kernel, A):
+    """Fill the lower triangle of A (n, n) with s2 (C + ratio I) + m2 11' + diag(noise) + v I."""
+    n = X.shape[0]
+    self_correlation(kernel, X, inverse_l, A)
+    for i in range(n):
+        for j in range(i):
+            A[i, j] = A[i, j] * s2 + mean_variance
+        A[i, i] = s2 * (1.0 + ratio) + mean_variance + noise[i] + v
+
+
+@njit(cache=True)
+def _log_prior(theta, evidence):
+    value = 0.0
+    for i in range(theta.size):
+        if not abs(theta[i]) < _LARGEST:
+            return -inf
+        z = (theta[i] - evidence.prior_mean[i]) / evidence.prior_deviation[i]
+        value -= 0.5 * z * z + log(evidence.prior_deviation[i]) + 0.5 * _LOG_2PI
+    return value
+
+
+@njit(types.float64(types.float64[::1], EVIDENCE_TYPE), cache=True)
+def log_posterior(theta, evidence):
+    """Return the log posterior density of theta (p,), up to no constant; -inf where A is not positive definite."""
+    value = _log_prior(theta, evidence)
+    if value == -inf:
+        return value
+    d = evidence.X.shape[1]
+    inverse_l = np.exp(-theta[:d])
+    s2, v = unpack(theta, evidence)
+    for b in range(evidence.weights.size):
+        start, stop = evidence.offsets[b], evidence.offsets[b + 1]
+        n = stop - start
+        if n == 0 or evidence.weights[b] == 0.0:
+            continue
+        A = np.empty((n, n))
+        data_covariance(
+            evidence.X[start:stop],
+            evidence.noise[start:stop],
+            inverse_l,
+            s2,
+            v,
+            evidence.ratio,
+            evidence.mean_variance,
+            evidence.kernel,
+            A,
+        )
+        if not cholesky(A):
+            return -inf
+        z = evidence.y[start:stop].copy()
+        solve_lower(A, z)
+        total = 0.5 * n * _LOG_2PI
+        for i in range(n):
+            total += 0.5 * z[i] * z[i] + log(A[i, i])
+        value -= evidence.weights[b] * total
+    return value
+
+
+@njit(cache=True)
+def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, gradient):
+    """Return log p of one block and add its derivatives to `gradient` (d + 2,): log l, log s2, log v."""
+    n, d = X.shape
+    C = np.empty((n, n))
+    factor = np.empty((n, n))
+    correlation_and_factor(kernel, X, X, inverse_l, C, factor)
+    L = np.empty((n, n))
+    for i in range(n):
+        for j in range(i):
+            L[i, j] = s2 * C[i, j] + mean_variance
+        L[i, i] = s2 * (1.0 + ratio) + mean_variance + noise[i] + v
+    if not cholesky(L):
+        return -inf
+    inverse = np.empty((n, n))
+    invert_lower(L, inverse)
+    A_inverse = np.dot(inverse.T, inverse)
+    alpha = np.dot(A_inverse, y)
+    value = -0.5 * n * _LOG_2PI
+    for i in range(n):
+        value -= 0.5 * y[i] * alpha[i] + log(L[i, i])
+    for i in range(n):  # 1/2 tr((alpha alpha' - A^-1) dA/dtheta), GPML (5.9)
+        for j in range(i):
+            w = (alpha[i] * alpha[j] - A_inverse[i, j]) * s2  # the two symmetric entries together
+            for k in range(d):
+                step = X[i, k] - X[j, k]
+                t = step * inverse_l[k]
+                gradient[k] += w * factor[i, j] * along(kernel, step, inverse_l[k]) * t * t
+            gradient[d] += w * C[i, j]
+        w = 0.5 * (alpha[i] * alpha[i] - A_inverse[i, i])
+        gradient[d] += w * s2 * (1.0 + ratio)
+        gradient[d + 1] += w * v
+    return value
+
+
+@njit(cache=True)
+def log_posterior_and_gradient(theta, evidence):
+    """Return the log posterior density of theta (p,) and its gradient (p,); -inf and 0 where A is not definite."""
+    gradient = np.zeros(theta.size)
+    value = _log_prior(theta, evidence)
+    if value == -inf:
+        return value, gradient
+    d = evidence.X.shape[1]
+    inverse_l = np.exp(-theta[:d])
+    s2, v = unpack(theta, evidence)
+    full = np.zeros(d + 2)
+    for b in range(evidence.weights.size):
+        start, stop = evidence.offsets[b], evidence.offsets[b + 1]
+        weight = evidence.weights[b]
+        if stop == start or weight == 0.0:
+            continue
+        part = np.zeros(d + 2)
+        block = _block_gradient(
+            evidence.X[start:stop],
+            evidence.y[start:stop],
+            evidence.noise[start:stop],
+            inverse_l,
+            s2,
+            v,
+            evidence.ratio,
+            evidence.mean_variance,
+            evidence.kernel,
+            part,
+        )
+        if block == -inf:
+            return -inf, gradient
+        value += weight * block
+        for i in range(d + 2):
+            full[i] += weight * part[i]
+    for i in range(d):
+        gradient[i] = full[i]
+    position = d
+    if evidence.learn_signal:
+        gradient[position] = full[d]
+        position += 1
+    if evidence.learn_noise:
+        gradient[position] = full[d + 1]
+    for i in range(theta.size):
+        gradient[i] -= (theta[i] - evidence.prior_mean[i]) / evidence.prior_deviation[i] ** 2
+    return value, gradient

@@ -1,0 +1,367 @@
+"""Gaussian-process regression with the hyperparameters integrated out by slice sampling: settings, learning, fitting.
+
+What is learnt is a `GaussianProcessPosterior`; the formulas of its predictions are in `prediction`.
+"""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from hashlib import sha256
+from math import log, sqrt
+from typing import Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.errors import InputError, unknown_name
+from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.surrogates.gaussian_process.heteroscedastic import most_likely_noise
+from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
+    Learning,
+    Learnt,
+    Prior,
+    from_prior,
+    learn,
+    mode,
+)
+from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
+from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence, log_posterior
+from surehold.optimization.surrogates.gaussian_process.outputs import Standardization, checked_range
+from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
+from surehold.optimization.surrogates.protocol import Posterior, mixture
+
+__all__ = ["NOISES", "GaussianProcess", "NoiseName"]
+
+NoiseName = Literal["none", "inferred", "heteroscedastic"]
+NOISES: Final = get_args(NoiseName)
+_REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
+SURPRISE: Final = 4.0  # standard deviations by which a trial may miss its prediction before all is learnt anew
+_LOUDEST: Final = 1e100  # standard deviation of the noise, in those of the outputs; its square stays finite
+
+
+class GaussianProcess:
+    """Gaussian-process regression; the hyperparameters are integrated out by slice sampling.
+
+    Parameters
+    ----------
+    kernel
+        "matern52" (default), "matern32", "squared_exponential", or "matern52_product", the product of Matern-5/2
+        correlations of single variables; one length-scale a dimension.
+    signal_variance
+        Fixed signal variance; None (default) learns it. In squared standard deviations of the outputs, or in squared
+        units of the outputs where `standardize` is False.
+    noise
+        Standard deviation of the observation noise: "none" (default) for a function that gives the same answer
+        again, a number in the outputs' units, "inferred" for one common standard deviation that is learnt, or
+        "heteroscedastic" for one that differs from place to place and is learnt. Known standard deviations of single
+        observations are an argument of `fit`.
+    ratio
+        Nugget on the diagonal of the data's covariance, as a fraction of the signal variance: what keeps it
+        factorizable.
+    standardize
+        Whether outputs are brought to zero mean and unit standard deviation before learning.
+    output_range
+        (lowest, highest) value to expect, if known: sets the scale while the trials do not show it yet.
+    mean_variance
+        Prior variance of a constant mean that is integrated out, in the units of `signal_variance`; 0 is a zero mean.
+    prior
+        Prior of the hyperparameters; by default length-scales have median 0.2 sqrt(d) box widths and a standard
+        deviation of 1 in the logarithm.
+    learning
+        Slice sampling or maximum a posteriori, particles, sweeps.
+    length_scales
+        Fixed length-scales (d,) in box widths; nothing is learnt but what is asked for above.
+
+    Raises
+    ------
+    InputError
+        For an unknown kernel, or numbers out of range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> X = np.linspace(0.0, 1.0, 9)[:, None]
+    >>> mean, std = GaussianProcess().fit(X, np.sin(6.0 * X[:, 0])).predict([[0.5]], return_std=True)
+    >>> bool(abs(mean[0] - np.sin(3.0)) < 1e-3)
+    True
+    """
+
+    def __init__(
+        self,
+        *,
+        kernel: str = "matern52",
+        signal_variance: float | None = None,
+        noise: float | NoiseName = "none",
+        ratio: float = 1e-10,
+        standardize: bool = True,
+        output_range: tuple[float, float] | None = None,
+        mean_variance: float = 0.0,
+        prior: Prior | None = None,
+        learning: Learning | None = None,
+        length_scales: ArrayLike | None = None,
+    ):
+        self._kernel = kernel_number(kernel)
+        self._signal_variance = None if signal_variance is None else _positive("signal_variance", signal_variance)
+        if isinstance(noise, str):
+            if noise not in NOISES:
+                raise unknown_name("observation noise", noise, (*NOISES, "a standard deviation"))
+        elif not (np.ndim(noise) == 0 and np.isfinite(noise) and noise >= 0.0):
+            raise InputError(f"observation noise is {noise!r}; give a finite standard deviation of 0 or more.")
+        self._noise = noise
+        self._ratio = float(ratio)
+        if not 0.0 <= self._ratio < 1.0:
+            raise InputError(f"ratio is {ratio!r}; the nugget is a fraction of the signal variance, in [0, 1).")
+        self._standardize = standardize
+        self._output_range = checked_range(output_range)
+        self._mean_variance = float(mean_variance)
+        if not (np.isfinite(self._mean_variance) and self._mean_variance >= 0.0):
+            raise InputError(f"mean_variance is {mean_variance!r}; give a finite number of 0 or more.")
+        self._prior = prior
+        self._learning = learning or Learning()
+        self._length_scales = None if length_scales is None else np.asarray(length_scales, dtype=np.float64)
+        if self._length_scales is not None and not np.all((self._length_scales > 0) & np.isfinite(self._length_scales)):
+            raise InputError(f"length_scales are {length_scales!r}; give positive finite numbers, one a dimension.")
+        self._posterior: GaussianProcessPosterior | None = None
+        self._learnt: OrderedDict[bytes, tuple[Standardization, Learnt]] = OrderedDict()  # saves time, changes nothing
+
+    def condition(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        rng: np.random.Generator,
+        previous: Posterior | None = None,
+        noise: NDArray[np.float64] | None = None,
+    ) -> GaussianProcessPosterior:
+        """Learn the hyperparameters from X (n, d) in the unit cube and finite y (n,), n >= 1.
+
+        From 32 trials on they are learnt from the first k of them, n - n/16 < k <= n, unless the later trials
+        contradict what was learnt: k, and all that follows, depend on the trials and `rng` alone, and one more trial
+        seldom costs a new learning.
+        `previous` is the posterior of the step before; its last particle starts the chains of the learning "slice".
+        `noise` (n,) are known standard deviations of the observations, in the outputs' units, in place of the setting.
+        """
+        if self._learning.method == "slice" or self._length_scales is not None or self._noise == "heteroscedastic":
+            last = previous.hyperparameters.theta[-1] if isinstance(previous, GaussianProcessPosterior) else None
+            return self.condition_on_blocks(X, y, rng, self.standardization(y), start=last, noise=noise)
+        n, stream = len(y), int(rng.integers(2**63))
+        k = learnt_from(n)
+        posterior = self._learnt_from(k, X, y, noise, stream)
+        if k < n and (posterior.outputs.flat or posterior.surprise(k) > SURPRISE):
+            posterior = self._learnt_from(n, X, y, noise, stream)
+        return posterior
+
+    def _learnt_from(
+        self, k: int, X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, stream: int
+    ) -> GaussianProcessPosterior:
+        """Return the posterior given all trials, with hyperparameters that were learnt from the first k of them."""
+        key = fingerprint(X[:k], y[:k], None if noise is None else noise[:k], stream)
+        if key not in self._learnt:
+            outputs = self.standardization(y[:k])
+            evidence = self._evidence(X[:k], y[:k], outputs, [k], (1.0,), None if noise is None else noise[:k])
+            self._learnt[key] = outputs, self._learn(evidence, outputs, np.random.default_rng([stream, k]), None)
+            while len(self._learnt) > _REMEMBERED:
+                self._learnt.popitem(last=False)
+        outputs, (particles, cost) = self._learnt[key]
+        evidence = self._evidence(X, y, outputs, [len(y)], (1.0,), noise)
+        return GaussianProcessPosterior(evidence, particles, outputs, cost)
+
+    def _learn(
+        self, evidence: Evidence, outputs: Standardization, rng: np.random.Generator, start: NDArray[np.float64] | None
+    ) -> Learnt:
+        if outputs.flat and self._standardize:
+            return from_prior(evidence, self._learning.particles, rng)
+        return learn(evidence, self._learning, rng, start)
+
+    def standardization(self, y: NDArray[np.float64]) -> Standardization:
+        """Return the map of outputs y (n,) to the scale on which this process learns."""
+        return Standardization.of(y, self._output_range) if self._standardize else Standardization.identity(y)
+
+    def centered(self, outputs: Standardization, y: NDArray[np.float64]) -> Standardization:
+        """Return a map with the scale of `outputs` but the mean of outputs y (n,), if this process standardizes."""
+        return outputs._replace(shift=float(y.mean()), flat=False) if self._standardize else outputs
+
+    def condition_on_blocks(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        rng: np.random.Generator,
+        outputs: Standardization,
+        *,
+        sizes: Sequence[int] | None = None,
+        weights: ArrayLike = (1.0,),
+        start: NDArray[np.float64] | None = None,
+        noise: NDArray[np.float64] | None = None,
+    ) -> GaussianProcessPosterior:
+        """Learn the hyperparameters from the weighted likelihoods of independent blocks; predict from the first one.
+
+        Parameters
+        ----------
+        X, y
+            Trials (n, d) in the unit cube and finite outputs (n,), block after block.
+        outputs
+            Map of the outputs to the scale on which is learnt.
+        sizes, weights
+            Number of trials and weight of each block; by default all trials are one block of weight 1.
+        start : (p,)
+            Last particle of the step before, or None.
+        noise : (n,)
+            Known standard deviations of the observations, in the outputs' units, in place of the setting.
+        """
+        evidence = self._evidence(X, y, outputs, [len(y)] if sizes is None else sizes, weights, noise)
+        log_noise = None
+        cost = 0
+        if self._length_scales is not None:
+            particles = self._fixed(evidence)[None, :]
+        else:
+            if self._noise == "heteroscedastic" and noise is None and not outputs.flat:
+                variances, log_noise = most_likely_noise(evidence)
+                evidence = evidence._replace(noise=variances)
+            particles, cost = self._learn(evidence, outputs, rng, start)
+        return GaussianProcessPosterior(evidence.first_block(), particles, outputs, cost, log_noise=log_noise)
+
+    def log_evidence(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        outputs: Standardization,
+        noise: NDArray[np.float64] | None = None,
+    ) -> float:
+        """Return about log p(y | X), hyperparameters integrated out: their mode's, less p/2 log n (Schwarz 1978).
+
+        Arguments as in `condition_on_blocks`.
+        """
+        evidence = self._evidence(X, y, outputs, [len(y)], (1.0,), noise)
+        if self._length_scales is not None:
+            return float(log_posterior(self._fixed(evidence), evidence))
+        theta, _ = mode(evidence)
+        return float(log_posterior(theta, evidence)) - 0.5 * theta.size * log(len(y))
+
+    def _fixed(self, evidence: Evidence) -> NDArray[np.float64]:
+        """Return the hyperparameters (p,) where length-scales are given; the others at their prior's mean."""
+        theta = evidence.prior_mean.copy()
+        d = evidence.X.shape[1]
+        theta[:d] = np.log(np.broadcast_to(np.asarray(self._length_scales), (d,)))
+        return theta
+
+    def _evidence(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        outputs: Standardization,
+        sizes: Sequence[int],
+        weights: ArrayLike,
+        noise: NDArray[np.float64] | None,
+    ) -> Evidence:
+        d = X.shape[1]
+        if self._length_scales is not None and self._length_scales.shape not in ((), (1,), (d,)):
+            raise InputError(f"length_scales have shape {self._length_scales.shape}; the inputs need ({d},).")
+        known = noise if noise is not None else np.full(len(y), 0.0 if isinstance(self._noise, str) else self._noise)
+        learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred" and noise is None
+        prior = self._prior or Prior((log(0.2 * sqrt(d)), 1.0))
+        prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise)
+        return Evidence(
+            np.ascontiguousarray(X, dtype=np.float64),
+            np.ascontiguousarray(outputs.apply(y)),
+            np.minimum(known / outputs.scale, _LOUDEST) ** 2,
+            np.cumsum([0, *sizes]),
+            np.array(weights, dtype=np.float64),
+            prior_mean,
+            prior_deviation,
+            1.0 if self._signal_variance is None else self._signal_variance,
+            self._ratio,
+            self._mean_variance,
+            self._kernel,
+            learn_signal,
+            learn_noise,
+        )
+
+    def fit(self, X: ArrayLike, y: ArrayLike, seed: int = 0, *, noise: ArrayLike | None = None) -> "GaussianProcess":
+        """Learn from X (n, d), preferably scaled to the unit cube, and y (n,); returns itself.
+
+        `noise` (n,) are known standard deviations of the observations, in the outputs' units; they replace the setting
+        of the same name.
+
+        Raises
+        ------
+        InputError
+            If shapes do not fit, a value is not finite, or a standard deviation is negative.
+        """
+        inputs, outputs = checked_data(X, y)
+        known = None if noise is None else checked_noise(noise, len(outputs))
+        with single_threaded():
+            self._posterior = self.condition(inputs, outputs, np.random.default_rng(seed), noise=known)
+        return self
+
+    @property
+    def posterior(self) -> GaussianProcessPosterior:
+        """What `fit` has learnt."""
+        if self._posterior is None:
+            raise InputError("this GaussianProcess has seen no data; call fit(X, y) first.")
+        return self._posterior
+
+    def predict(self, X: ArrayLike, return_std: bool = False):
+        """Return the mean (q,) at X (q, d), and the standard deviation (q,) of the latent function where asked for."""
+        queries, _ = checked_data(X, None, self.posterior.evidence.X.shape[1])
+        with single_threaded():
+            mean, variance = mixture(self.posterior.moments(queries))
+        return (mean, np.sqrt(variance)) if return_std else mean
+
+    def noise_std(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Return the standard deviation of the observation noise (q,) at X (q, d): what is known of it, or learnt.
+
+        Of known standard deviations of single observations the quadratic mean is taken.
+        """
+        queries, _ = checked_data(X, None, self.posterior.evidence.X.shape[1])
+        return np.sqrt(self.posterior.noise_variance(queries))
+
+
+def checked_data(
+    X: ArrayLike, y: ArrayLike | None, d: int | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return X (n, d) and y (n,) as float64 arrays (y empty where None); raises InputError where they do not fit."""
+    try:
+        inputs = np.ascontiguousarray(X, dtype=np.float64)
+        outputs = np.ascontiguousarray([] if y is None else y, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("X and y must be numeric arrays of shapes (n, d) and (n,).") from None
+    if inputs.ndim != 2 or inputs.shape[1] == 0 or (d is not None and inputs.shape[1] != d):
+        wanted = "(n, d)" if d is None else f"(q, {d})"
+        raise InputError(f"X has shape {inputs.shape}; it must be {wanted}: one row a point.")
+    if y is not None and outputs.shape != (len(inputs),):
+        raise InputError(f"y has shape {outputs.shape}, but X has {len(inputs)} rows; give one output a row.")
+    if y is not None and len(inputs) == 0:
+        raise InputError("X has no rows; give at least one observation.")
+    for name, values in (("X", inputs), ("y", outputs)):
+        if not np.all(np.isfinite(values)):
+            raise InputError(f"{name} holds NaN or infinity; remove those observations first.")
+    return inputs, outputs
+
+
+def checked_noise(noise: ArrayLike, n: int) -> NDArray[np.float64]:
+    try:
+        deviations = np.asarray(noise, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"noise is {noise!r}; give {n} standard deviations, one an observation.") from None
+    if deviations.shape != (n,):
+        raise InputError(f"noise has shape {deviations.shape}, but there are {n} observations; give one number each.")
+    if not np.all(np.isfinite(deviations) & (deviations >= 0.0)):
+        raise InputError("noise holds a number that is negative or not finite; give standard deviations of 0 or more.")
+    return deviations
+
+
+def _positive(name: str, value: float) -> float:
+    if not (np.isfinite(value) and value > 0.0):
+        raise InputError(f"{name} is {value!r}; give a positive finite number.")
+    return float(value)
+
+
+def learnt_from(n: int) -> int:
+    """Return k: of n trials, the first k are those that hyperparameters are learnt from; n - n/16 < k <= n."""
+    return n - n % (1 << max(0, n.bit_length() - 5))
+
+
+def fingerprint(X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, *others) -> bytes:
+    """Return a digest of trials and of other settings that have a faithful `repr`."""
+    content = sha256(repr((X.shape, noise is None, others)).encode())
+    for array in (X, y) if noise is None else (X, y, noise):
+        content.update(np.ascontiguousarray(array).tobytes())
+    return content.digest()

@@ -1,0 +1,202 @@
+"""Means, variances and draws of Gaussian processes at new points, one process a particle (compiled).
+
+Legend (the thesis' symbols in brackets)
+    X, y       trials: inputs (n, d) in the unit cube, outputs (n,)
+    theta_j    particle j of m: log length-scales, log signal variance, log noise variance    [theta_1..theta_m]
+    k_j        covariance of the query with X under particle j, (n,)
+    A_j        covariance of the data under particle j, (n, n) = L_j L_j'
+    mean_j     k_j' A_j^-1 y                                                                   thesis (3.5)
+    variance_j k_j(x, x) - k_j' A_j^-1 k_j                                                     thesis (3.6)
+
+A weighted sum of function values, sum_i w_i f(x + xi_i), is itself Gaussian under each particle: its covariance with
+the data is sum_i w_i k_j(x + xi_i, X) and its prior variance sum_ij w_i w_j k_j(xi_i, xi_j). With one offset of 0 that
+is f(x) itself, so one compiled function serves both.
+"""
+
+import numpy as np
+from numba import njit
+
+from surehold.optimization.surrogates.gaussian_process.kernels import (
+    along,
+    correlation_and_factor,
+    cross_correlation,
+    transposed,
+)
+from surehold.optimization.surrogates.gaussian_process.likelihood import (
+    cholesky,
+    data_covariance,
+    invert_lower,
+    solve_lower,
+    solve_lower_transposed,
+)
+
+__all__ = ["average", "factorize", "sample"]
+
+_LARGEST_REPAIR = 1e-2  # nugget ratio beyond which a factorization is given up
+
+
+@njit(cache=True)
+def factorize(X, Y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, inverse_L, alpha):
+    """Fill inverse_L (m, n, n) and alpha (m, n) = A^-1 y_j; return how many nuggets were enlarged, -1 on failure."""
+    m, n = Y.shape
+    repaired = 0
+    A = np.empty((n, n))
+    for j in range(m):
+        nugget = ratio
+        while True:
+            data_covariance(X, noise, inverse_l[j], s2[j], v[j], nugget, mean_variance, kernel, A)
+            if cholesky(A):
+                break
+            nugget = max(10.0 * nugget, 1e-12)
+            if nugget > _LARGEST_REPAIR:
+                return -1
+        if nugget > ratio:
+            repaired += 1
+        for i in range(n):  # an assignment of arrays takes two seconds to compile
+            alpha[j, i] = Y[j, i]
+        solve_lower(A, alpha[j])
+        solve_lower_transposed(A, alpha[j])
+        invert_lower(A, inverse_L[j])
+    return repaired
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _weighted_sums(C, weights, out):
+    """Fill out (n, q) with the sums over s of weights (s,) times the columns of C (n, q s)."""
+    s = weights.size
+    for a in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            t = 0.0
+            for w in range(s):
+                t += weights[w] * C[a, i * s + w]
+            out[a, i] = t
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _weighted_slopes(kernel, F, X, Z, slopes, weights, k, scale, out):
+    """Fill out (n, q) with the sums over s of -weights g (z_k - x_k) slope, for radial factors F (n, q s).
+
+    Z (d, q s) are the perturbed points, slopes (d, q s) their derivatives by the query, scale the inverse length-scale
+    of dimension k.
+    """
+    s = weights.size
+    for a in range(out.shape[0]):
+        x = X[a, k]
+        for i in range(out.shape[1]):
+            t = 0.0
+            for w in range(s):
+                c = i * s + w
+                step = Z[k, c] - x
+                t -= weights[w] * F[a, c] * along(kernel, step, scale) * step * slopes[k, c]
+            out[a, i] = t
+
+
+@njit(cache=True)
+def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha, gradient):
+    """Return mean, variance (m, q) and their gradients (m, q, d) of the weighted sums at Q (q, d).
+
+    offsets (b, s, d): the same perturbations for every query (b = 1) or its own for each (b = q); slopes (b, s, d):
+    derivative of each coordinate of query + offset by that coordinate of the query.
+    """
+    m, n = alpha.shape
+    q, d = Q.shape
+    s = weights.size
+    last = offsets.shape[0] - 1
+    points = np.empty((q * s, d))
+    slope = np.ones((d, q * s if gradient else 0))
+    for i in range(q):
+        for w in range(s):
+            for k in range(d):
+                points[i * s + w, k] = Q[i, k] + offsets[min(i, last), w, k]
+                if gradient:
+                    slope[k, i * s + w] = slopes[min(i, last), w, k]
+    Z = transposed(points)
+    mean = np.zeros((m, q))
+    variance = np.empty((m, q))
+    mean_gradient = np.zeros((m, q if gradient else 0, d))
+    variance_gradient = np.zeros((m, q if gradient else 0, d))
+    C = np.empty((n, q * s))
+    F = np.empty((n, q * s if gradient else 0))
+    K = np.empty((n, q))
+    D = np.empty((n, q if gradient else 0))
+    own = np.empty((s, s))
+    own_factor = np.empty((s, s))
+    shift = mean_variance * weights.sum()
+    for j in range(m):
+        for b in range(offsets.shape[0]):
+            xi = offsets[b]
+            correlation_and_factor(kernel, xi, xi, inverse_l[j], own, own_factor)
+            prior = 0.0
+            for w in range(s):
+                for o in range(s):
+                    prior += weights[w] * weights[o] * (s2[j] * own[w, o] + mean_variance)
+            variance[j, b:] = prior
+            if gradient:
+                for k in range(d):
+                    t = 0.0
+                    for w in range(s):
+                        for o in range(s):
+                            step = xi[w, k] - xi[o, k]
+                            step *= (slopes[b, w, k] - slopes[b, o, k]) * along(kernel, step, inverse_l[j, k])
+                            t -= weights[w] * weights[o] * own_factor[w, o] * step
+                    variance_gradient[j, b:, k] = s2[j] * t * inverse_l[j, k] ** 2
+        if gradient:
+            correlation_and_factor(kernel, X, points, inverse_l[j], C, F)
+        else:
+            cross_correlation(kernel, X, points, inverse_l[j], C)
+        _weighted_sums(C, s2[j] * weights, K)
+        if shift != 0.0:
+            K += shift
+        V = np.dot(inverse_L[j], K)
+        for a in range(n):
+            for i in range(q):
+                mean[j, i] += alpha[j, a] * K[a, i]
+                variance[j, i] -= V[a, i] * V[a, i]
+        if gradient:
+            W = np.dot(inverse_L[j].T, V)
+            for k in range(d):
+                scale = inverse_l[j, k]
+                _weighted_slopes(kernel, F, X, Z, slope, s2[j] * scale**2 * weights, k, scale, D)
+                for a in range(n):
+                    for i in range(q):
+                        mean_gradient[j, i, k] += alpha[j, a] * D[a, i]
+                        variance_gradient[j, i, k] -= 2.0 * W[a, i] * D[a, i]
+    return mean, np.maximum(variance, 0.0), mean_gradient, variance_gradient
+
+
+@njit(cache=True)
+def sample(P, normals, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha):
+    """Return joint draws (m, q, b, s) of f at the points P (q, s, d), from standard normals (b, s)."""
+    m, n = alpha.shape
+    q, s, _ = P.shape
+    draws = np.empty((m, q, normals.shape[0], s))
+    K = np.empty((n, s))
+    C = np.empty((s, s))
+    for j in range(m):
+        for i in range(q):
+            cross_correlation(kernel, X, P[i], inverse_l[j], K)
+            for a in range(n):
+                for w in range(s):
+                    K[a, w] = s2[j] * K[a, w] + mean_variance
+            V = np.dot(inverse_L[j], K)
+            cross_correlation(kernel, P[i], P[i], inverse_l[j], C)
+            for w in range(s):
+                for o in range(s):
+                    C[w, o] = s2[j] * C[w, o] + mean_variance
+            C -= np.dot(V.T, V)
+            nugget = 1e-10 * (s2[j] + mean_variance)
+            while True:
+                root = C.copy()
+                for w in range(s):
+                    root[w, w] += nugget
+                if cholesky(root):
+                    break
+                nugget *= 10.0
+            mean = np.dot(alpha[j], K)
+            for b in range(normals.shape[0]):
+                for w in range(s):
+                    t = mean[w]
+                    for o in range(w + 1):
+                        t += root[w, o] * normals[b, o]
+                    draws[j, i, b, w] = t
+    return draws

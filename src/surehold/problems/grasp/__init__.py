@@ -1,0 +1,1 @@
+"""Grasping as a problem: its options, variables and default poses."""

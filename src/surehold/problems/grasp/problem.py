@@ -1,0 +1,215 @@
+"""Grasping as a problem: pose offsets and posture in, quality of the closed grasp out.
+
+    dx, dy, dz   offsets of the hand along the palm's default axes: along the fingers, towards the index side, towards
+                 the object [m]
+    rx, ry, rz   turns about the hand's grasp center, R = R_default Rx Ry Rz [rad]
+    s1           posture: opposition of the thumb [rad]
+    h, b, w      half extents of the object's box across the facet, along the fingers, and along the palm's y [m]
+
+Bounds (after the published grasp experiments): dx within ±(b + 25 mm), dy within ±w, the distance of the grasp center
+from the box center within h/3 and h/3 + 40 mm (1 + h / 50 mm), turns within ±45 degrees, s1 where it moves the thumb.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.errors import InputError, unknown_name
+from surehold.grasping.hand.model import Hand
+from surehold.grasping.hand.synergy import preshape_of
+from surehold.grasping.object.model import GraspObject, shipped_object
+from surehold.grasping.poses import Pose, default_pose, facet_axes
+from surehold.grasping.simulator import THESIS, Simulator
+from surehold.grasping.simulator import Grasp as GraspOutcome
+from surehold.optimization.box import Box
+from surehold.problems.grasp.default_poses import GraspDefault, default_facet, grasp_default
+from surehold.problems.problem import checked_points
+
+__all__ = ["VARIABLES", "Grasp"]
+
+#: All variables of a grasp, and their units.
+VARIABLES: Final[Mapping[str, str]] = {
+    "dx": "m",
+    "dy": "m",
+    "dz": "m",
+    "rx": "rad",
+    "ry": "rad",
+    "rz": "rad",
+    "s1": "rad",
+}
+
+
+class Grasp:
+    """The quality of a grasp as a function of some of its seven variables.
+
+    Parameters
+    ----------
+    obj
+        Name of a shipped object ("mug", "bottle", "glass", "drill") or a `GraspObject`.
+    facet
+        One of the 24 modes, "facet-thumb": the facet of the object's box that the palm faces, then the neighboring
+        facet against which the thumb comes to press. By default "right-front", for the drill "bottom-front".
+    variables
+        Names of the free variables, a subset of `VARIABLES`; their order is the order of the coordinates.
+    contact, quality, closing, friction, torsion, cones, task, collision, hand, preshape
+        As in `surehold.grasping.Simulator`.
+    preset
+        "thesis": single contacts, the quality "simox", closing "synergy", polyhedral cones, collisions worth 0, and s1
+        within ±pi, whatever is said of them; "" for none.
+    bounds
+        `{name: (lower, upper)}` in m and rad for free variables that shall not have the bounds given above.
+    fixed
+        `{name: value}` in m and rad for variables that are not free and shall not have their default: 0 for the
+        offsets, and for s1 what `default` says.
+    progress
+        Called with the share that is done while the default pose of a mesh or of another hand is searched.
+
+    Attributes
+    ----------
+    name : such as "mug, right-front"
+    box : Box of the free variables
+    units : tuple of their units, "m" or "rad"
+    default : standoff and s1 of the default pose and how they were found
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a variable is named twice or both free and fixed, or a bound or value is not finite.
+    """
+
+    def __init__(
+        self,
+        obj: str | GraspObject = "mug",
+        facet: str = "",
+        variables: Sequence[str] = ("dx", "dy"),
+        *,
+        contact: str = "graded",
+        quality: str = "epsilon",
+        closing: str = "adaptive",
+        friction: float | None = None,
+        torsion: float = 0.0,
+        cones: Literal["polyhedral", "round"] = "round",
+        task: ArrayLike | None = None,
+        collision: str = "penalty",
+        preset: str = "",
+        hand: str | Hand = "icub-left",
+        preshape: str | None = None,
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        fixed: Mapping[str, float] | None = None,
+        progress: Callable[[float], None] = lambda share: None,
+    ):
+        names = (variables,) if isinstance(variables, str) else tuple(variables)
+        for name in [*names, *(bounds or {}), *(fixed or {})]:
+            if name not in VARIABLES:
+                raise unknown_name("variable", name, VARIABLES)
+        if len(set(names)) != len(names) or not names:
+            raise InputError(f"variables are {names}; name one or more of {', '.join(VARIABLES)}, each once.")
+        for name in bounds or {}:
+            if name not in names:
+                raise InputError(f"bounds are given for '{name}', which is not free; add it to the variables {names}.")
+        for name, value in (fixed or {}).items():
+            if name in names:
+                raise InputError(f"'{name}' is both free and fixed; take it out of one of the two.")
+            if not np.isfinite(value):
+                raise InputError(f"'{name}' is fixed at {value!r}; give a finite number in {VARIABLES[name]}.")
+        body = shipped_object(obj) if isinstance(obj, str) else obj
+        facet = facet or default_facet(body)
+        axes = facet_axes(facet)
+        self.object: Final[GraspObject] = body
+        self.facet: Final[str] = facet
+        self.name: Final[str] = f"{body.name}, {facet}"
+        self._settings: dict[str, Any] = {
+            "contact": contact,
+            "quality": quality,
+            "closing": closing,
+            "friction": friction,
+            "torsion": torsion,
+            "cones": cones,
+            "task": task,
+            "collision": collision,
+            "hand": hand,
+            "preshape": preshape,
+        }
+        if preset not in ("", "thesis"):
+            raise unknown_name("preset", preset, ["thesis"])
+        if preset:
+            self._settings |= THESIS
+        self._simulator: Simulator | None = None
+        self._simulator = self._build()
+        chosen = preshape_of(self._simulator.hand, self._simulator.preshape)
+        self._s1_range = chosen.s1_range if preset else chosen.s1_useful
+        self.default: Final[GraspDefault] = grasp_default(self.simulator, facet, progress)
+        self._fixed: dict[str, float] = dict.fromkeys(VARIABLES, 0.0) | {"s1": self.default.s1} | dict(fixed or {})
+        if "s1" in names and "s1" not in (bounds or {}) and self._s1_range[0] >= self._s1_range[1]:
+            raise InputError(
+                f"the preshape '{self._simulator.preshape}' of hand '{self._simulator.hand.name}' has no posture "
+                "variable; take s1 out of the variables."
+            )
+        limits = self._limits(np.abs(axes.T) @ body.box_half_extents) | dict(bounds or {})
+        self.box: Final[Box] = Box({name: limits[name] for name in names})
+        self.units: Final[tuple[str, ...]] = tuple(VARIABLES[name] for name in names)
+
+    @property
+    def simulator(self) -> Simulator:
+        """The simulator that runs the trials."""
+        if self._simulator is None:  # in a worker process: the distance field is read from the cache, not sent along
+            self._simulator = self._build()
+        return self._simulator
+
+    def warm_up(self) -> None:
+        """Compile what a trial needs, if it is not yet in the cache: some seconds once for an installation."""
+        self.simulator.warm_up()
+
+    def pose(self, x: ArrayLike) -> Pose:
+        """Return the pose of the palm in the object's frame at x (d,)."""
+        values = self._values(self._one(x))
+        offsets = [values[name] for name in ("dx", "dy", "dz", "rx", "ry", "rz")]
+        return default_pose(self.simulator.hand, self.object, self.facet, self.default.standoff, offsets)
+
+    def grasp(self, x: ArrayLike) -> GraspOutcome:
+        """Return the whole outcome of the trial at x (d,)."""
+        return self.simulator.grasp(self.pose(x), self._values(self._one(x))["s1"])
+
+    def __call__(self, x: ArrayLike) -> float | NDArray[np.float64]:
+        """Return the quality at x (d,) as a float, or the qualities at x (n, d) as an array (n,)."""
+        points, single = checked_points(x, self.box)
+        values = [self.grasp(point).quality for point in points]
+        return values[0] if single else np.array(values)
+
+    def _one(self, x: ArrayLike) -> NDArray[np.float64]:
+        points, _ = checked_points(x, self.box)
+        if len(points) != 1:
+            raise InputError(f"x holds {len(points)} points; give one point ({self.box.dimension},).")
+        if not np.all(np.isfinite(points)):
+            raise InputError(f"x = {points[0].tolist()} is not finite; give a point of {self.box!r}.")
+        return points[0]
+
+    def _values(self, x: NDArray[np.float64]) -> dict[str, float]:
+        return self._fixed | self.box.as_dict(x)
+
+    def _limits(self, half: NDArray[np.float64]) -> dict[str, tuple[float, float]]:
+        along, across, depth = (float(v) for v in half)
+        nearest = depth / 3.0
+        farthest = nearest + 0.040 * (1.0 + depth / 0.050)
+        quarter = np.pi / 4.0
+        return {
+            "dx": (-along - 0.025, along + 0.025),
+            "dy": (-across, across),
+            "dz": (self.default.standoff - farthest, self.default.standoff - nearest),
+            "rx": (-quarter, quarter),
+            "ry": (-quarter, quarter),
+            "rz": (-quarter, quarter),
+            "s1": self._s1_range,
+        }
+
+    def _build(self) -> Simulator:
+        settings = dict(self._settings)
+        return Simulator(settings.pop("hand"), self.object, **settings)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_simulator": None}
+
+    def __repr__(self) -> str:
+        return f"<grasp {self.name}: {self._settings['contact']} contacts, {self.box!r}>"

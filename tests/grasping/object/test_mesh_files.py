@@ -1,0 +1,224 @@
+"""Meshes of one's own: what is refused and why, what is repaired, and closed forms of size, mass and box."""
+
+import gzip
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from surehold.errors import InputError
+from surehold.grasping import Simulator, default_pose
+from surehold.grasping.object.mesh_files import load_mesh
+
+BOX = (60.0, 40.0, 30.0)
+
+
+def box():
+    return trimesh.creation.box(BOX)
+
+
+def ball(radius=30.0, subdivisions=3):
+    return trimesh.creation.icosphere(subdivisions, radius)
+
+
+def stored(tmp_path, mesh, name="part.stl"):
+    mesh.export(tmp_path / name)
+    return tmp_path / name
+
+
+def without(mesh, count):
+    mesh.update_faces(np.arange(len(mesh.faces)) >= count)
+    return mesh
+
+
+def refused(path, *words, unit="mm", **options):
+    with pytest.raises(InputError) as error:
+        load_mesh(path, unit, **options)
+    message = str(error.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
+
+
+@pytest.mark.parametrize("name", ["part.stl", "part.obj", "part.ply", "part.glb"])
+def test_every_format_gives_the_same_box(tmp_path, name):
+    mesh = box()
+    if name.endswith("glb"):
+        mesh.apply_scale(1e-3)
+    loaded = load_mesh(stored(tmp_path, mesh, name), None if name.endswith("glb") else "mm")
+    assert len(loaded.object.vertices) == 8
+    assert sorted(2e3 * loaded.object.box_half_extents) == pytest.approx([30.0, 40.0, 60.0], abs=1e-3)
+    assert loaded.object.mass == pytest.approx(0.072)
+    assert "12 triangles" in loaded.diagnosis
+    assert loaded.diagnosis.endswith("72 g at 1000 kg/m^3")
+
+
+def test_mass_box_and_center_of_a_turned_box(tmp_path):
+    mesh = box()
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(0.5, (1, 2, 3)))
+    mesh.apply_translation((100.0, 0.0, 20.0))
+    part = load_mesh(stored(tmp_path, mesh), "mm", mass=0.4).object
+    assert part.mass == 0.4
+    np.testing.assert_allclose(part.center_of_mass, (0.1, 0.0, 0.02), atol=1e-7)
+    np.testing.assert_allclose(sorted(2e3 * part.box_half_extents), sorted(BOX), atol=1e-3)
+    truth = Rotation.from_rotvec(0.5 * np.array([1, 2, 3]) / np.sqrt(14.0)).as_matrix()
+    np.testing.assert_allclose(np.abs(part.axes), np.abs(truth), atol=1e-4)
+    assert np.linalg.det(part.axes) == pytest.approx(1.0)
+    np.testing.assert_array_equal(load_mesh(tmp_path / "part.stl", "mm", frame="file").object.axes, np.eye(3))
+
+
+def test_axes_of_a_body_of_revolution_are_those_of_the_file(tmp_path):
+    mesh = trimesh.creation.cylinder(20.0, 100.0, sections=32)
+    part = load_mesh(stored(tmp_path, mesh), "mm", frame="principal").object
+    np.testing.assert_allclose(part.axes, np.eye(3), atol=1e-6)
+
+
+def test_units_are_lengths(tmp_path):
+    for unit in ("furlong", "", "MM"):
+        refused(stored(tmp_path, box()), f"unit '{unit}' is unknown", "mm, cm, m, in", unit=unit)
+
+
+def test_size_in_mm_and_the_unit_that_would_fit(tmp_path):
+    path = stored(tmp_path, box())
+    refused(path, "60,000 x 40,000 x 30,000 mm in unit m", "too large", "is its unit mm", unit="m")
+    small = box()
+    small.apply_scale(1e-3)
+    refused(stored(tmp_path, small, "small.stl"), "0.06 x 0.04 x 0.03 mm", "too small", "is its unit m?")
+    refused(path, "does not say its unit", unit=None)
+
+
+def test_inside_out_is_turned_and_said(tmp_path):
+    mesh = ball()
+    mesh.invert()
+    loaded = load_mesh(stored(tmp_path, mesh), "mm")
+    assert "inside out" in loaded.diagnosis
+    again = trimesh.Trimesh(loaded.object.vertices, loaded.object.faces)
+    assert again.volume > 0.0
+
+
+def test_a_small_hole_is_bridged_and_a_large_one_refused(tmp_path):
+    loaded = load_mesh(stored(tmp_path, without(ball(), 4), "hole.ply"), "mm")
+    assert "not watertight: 1 hole" in loaded.diagnosis
+    simulator = Simulator(obj=loaded.object)
+    assert simulator.field.distance(np.zeros((1, 3)))[0] == pytest.approx(-0.030, abs=0.001)
+    refused(stored(tmp_path, without(box(), 2), "open.stl"), "60 x 40 x 30 mm", "open surface")
+
+
+def test_normals_that_disagree_are_refused(tmp_path):
+    mesh = ball()
+    faces = mesh.faces.copy()
+    faces[::2] = faces[::2, ::-1]
+    mixed = trimesh.Trimesh(mesh.vertices, faces, process=False)
+    refused(stored(tmp_path, mixed, "mixed.ply"), "disagree about what is outside")
+
+
+def test_degenerate_and_flat(tmp_path):
+    refused(
+        stored(tmp_path, trimesh.Trimesh([[0, 0, 0], [10, 0, 0], [0, 10, 0]], [[0, 1, 2]], process=False), "one.ply"),
+        "flat",
+        "10 x 10 x 0 mm",
+    )
+    refused(stored(tmp_path, trimesh.creation.box((60, 40, 0.0001)), "sheet.stl"), "flat")
+    line = trimesh.Trimesh([[0, 0, 0], [10, 0, 0], [20, 0, 0]], [[0, 1, 2]], process=False)
+    refused(stored(tmp_path, line, "line.ply"), "none of its 1 triangles has an area")
+
+
+def test_triangles_without_area_are_left_out(tmp_path):
+    mesh = box()
+    faces = np.vstack([mesh.faces, [[0, 0, 1]]])
+    loaded = load_mesh(stored(tmp_path, trimesh.Trimesh(mesh.vertices, faces, process=False), "extra.ply"), "mm")
+    assert "1 triangles without area are left out" in loaded.diagnosis
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_coordinates_that_are_not_finite(tmp_path, value):
+    content = bytearray(stored(tmp_path, box()).read_bytes())
+    struct.pack_into("<f", content, 84 + 12, value)
+    (tmp_path / "bad.stl").write_bytes(content)
+    refused(tmp_path / "bad.stl", "not finite")
+
+
+def test_damaged_files(tmp_path):
+    whole = stored(tmp_path, box()).read_bytes()
+    glb = box()
+    glb.apply_scale(1e-3)
+    cases = {
+        "empty.stl": b"",
+        "cut.stl": whole[:200],
+        "many.stl": whole[:80] + struct.pack("<I", 4_000_000_000) + whole[84:],
+        "noise.stl": np.random.default_rng(0).bytes(5000),
+        "noise.ply": np.random.default_rng(1).bytes(5000),
+        "noise.glb": np.random.default_rng(2).bytes(5000),
+        "noise.gltf": np.random.default_rng(3).bytes(5000),
+        "noise.obj": np.random.default_rng(4).bytes(5000),
+        "cut.glb": stored(tmp_path, glb, "part.glb").read_bytes()[:-100],
+        "list.gltf": b"[1, 2]",
+        "deep.gltf": b"[" * 100_000,
+        "null.gltf": b'{"buffers": null}',
+        "index.obj": b"v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 9\n",
+        "points.obj": b"v 0 0 0\nv 1 1 1\n",
+    }
+    for name, content in cases.items():
+        (tmp_path / name).write_bytes(content)
+        refused(tmp_path / name, name)
+    refused(tmp_path / "nowhere.stl", "cannot read")
+    refused(tmp_path, "is no mesh file")
+
+
+def test_archives_are_not_opened(tmp_path):
+    for name in ("part.zip", "part.3mf", "part.tar.gz"):
+        refused(tmp_path / name, "archives are not opened")
+    (tmp_path / "packed.stl").write_bytes(gzip.compress(stored(tmp_path, box()).read_bytes()))
+    refused(tmp_path / "packed.stl", "is an archive")
+
+
+def test_nothing_outside_the_file_is_read(tmp_path, monkeypatch):
+    path = tmp_path / "part.obj"
+    lines = ["mtllib /etc/passwd", "mtllib secret.mtl", "usemtl a", *(f"v {p}" for p in ("0 0 0", "10 0 0", "0 10 0"))]
+    path.write_text("\n".join([*lines, "v 0 0 10", "f 1 3 2", "f 1 2 4", "f 2 3 4", "f 1 4 3"]))
+    (tmp_path / "secret.mtl").write_text("newmtl a\nmap_Kd /etc/passwd\n")
+    opened = []
+    read = Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda self: opened.append(self) or read(self))
+    monkeypatch.setattr("builtins.open", lambda *a, **k: pytest.fail(f"{a} was opened"))
+    assert load_mesh(path, "mm").object.mass == pytest.approx(1e-3 / 6.0)
+    assert opened == [path]
+
+
+@pytest.mark.parametrize("where", ["/etc/passwd", "http://localhost:1/a.bin", "../data.bin"])
+def test_buffers_elsewhere_are_refused_and_textures_ignored(tmp_path, where):
+    mesh = box()
+    mesh.apply_scale(1e-3)
+    parts = trimesh.Scene(mesh).export(file_type="gltf", embed_buffers=True)
+    data = json.loads(parts["model.gltf"] if isinstance(parts, dict) else parts)
+    path = tmp_path / "part.gltf"
+    textured = data | {"images": [{"uri": where}], "textures": [{"source": 0}], "materials": [{"name": "m"}]}
+    path.write_text(json.dumps(textured))
+    assert load_mesh(path).object.mass == pytest.approx(0.072)
+    data["buffers"][0]["uri"] = where
+    path.write_text(json.dumps(data))
+    refused(path, "keeps its triangles in", unit=None)
+
+
+def test_options(tmp_path):
+    path = stored(tmp_path, box())
+    for mass in (0.0, -1.0, np.nan, 1e9):
+        refused(path, "mass is", mass=mass)
+    refused(path, "frame 'weird' is unknown", frame="weird")
+
+
+def test_a_user_mesh_is_grasped_like_the_same_shipped_solid(tmp_path):
+    """A mesh of the bottle and the bottle's closed forms differ by what the grid and the chords of the circle do."""
+    shipped = Simulator(obj="bottle")
+    mesh = trimesh.Trimesh(1e3 * shipped.object.vertices, shipped.object.faces, process=False)
+    part = load_mesh(stored(tmp_path, mesh), "mm", mass=shipped.object.mass, frame="file").object
+    own = Simulator(obj=part, friction=shipped.friction)
+    pose = default_pose(shipped.hand, shipped.object, "right-front", 0.0087, (-0.032, 0.0, 0.0, 0.0, 0.0, 0.0))
+    expected, found = shipped.grasp(pose, -0.7), own.grasp(pose, -0.7)
+    assert found.status == expected.status == "ok"
+    np.testing.assert_allclose(found.joints, expected.joints, atol=0.02)
+    assert found.quality == pytest.approx(expected.quality, rel=0.1)

@@ -1,0 +1,145 @@
+"""The check by physics: closed forms where there are some, and verdicts that anybody would give."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from surehold.errors import InputError
+from surehold.grasping import Pose, Simulator, default_pose, shipped_object
+from surehold.grasping.hand.configuration import read_hand_config
+from surehold.grasping.hand.files import load_hand
+from surehold.grasping.physics.check import LOADS, GraspChecker
+
+
+@pytest.fixture(scope="module")
+def bottle():
+    return Simulator(obj="bottle")
+
+
+@pytest.fixture(scope="module")
+def checker(bottle):
+    return GraspChecker(bottle)
+
+
+def grasp_at(simulator, dx, standoff=0.0087, s1=-0.7):
+    return simulator.grasp(
+        default_pose(simulator.hand, simulator.object, "right-front", standoff, (dx, *[0.0] * 5)), s1
+    )
+
+
+def test_a_good_power_grasp_holds_the_bottle(bottle, checker):
+    grasp = grasp_at(bottle, -0.032)
+    assert grasp.quality > 0.1
+    check = checker.check(grasp)
+    assert check.verdict == "held"
+    assert tuple(load.load for load in check.loads) == LOADS
+    assert check.moved == max(load.moved for load in check.loads) < 0.005
+    assert check.settled < 0.04
+
+
+def test_an_empty_hand_and_a_touch_of_fingertips_drop_it(bottle, checker):
+    empty = grasp_at(bottle, 0.0, standoff=0.4)
+    touch = grasp_at(bottle, -0.054)
+    assert (empty.status, touch.status) == ("no contact", "not closed")
+    assert len(touch.contacts) >= 2
+    inside = grasp_at(bottle, 0.0)
+    assert inside.status == "initial collision"
+    checks = checker.checks([empty, touch, inside])
+    assert [check.verdict for check in checks] == ["dropped"] * 3
+    fall = 0.5 * 9.81 * 1.0**2
+    free = [load for load in checks[0].loads[:6] if load.turned < 1e-6]
+    assert len(free) == 5, "one falls onto the hand"
+    for load in free:
+        assert load.moved == pytest.approx(fall, rel=0.003), "nothing slows the fall"
+    assert checks[0].settled == 0.0
+
+
+def test_what_is_heavy_or_slippery_or_held_weakly_is_lost(bottle):
+    grasp = grasp_at(bottle, -0.032)
+    assert GraspChecker(bottle, mass=12.0).check(grasp).verdict != "held"
+    assert GraspChecker(bottle, finger_force=0.05).check(grasp).verdict != "held"
+    slippery = Simulator(obj="bottle", friction=0.02)
+    assert GraspChecker(slippery).check(grasp_at(slippery, -0.032)).verdict != "held"
+
+
+def test_fingers_that_slide_squeeze_too(tmp_path):
+    model, config = tmp_path / "gripper.xml", tmp_path / "gripper.yaml"
+    model.write_text("""
+<mujoco><worldbody><body name="palm"><geom type="box" size=".05 .02 .01"/>
+  <body name="left" pos="-.045 0 .02"><joint name="left" type="slide" axis="1 0 0" range="0 .04"/>
+    <geom type="box" pos="0 0 .03" size=".005 .01 .03"/></body>
+  <body name="right" pos=".045 0 .02"><joint name="right" type="slide" axis="-1 0 0" range="0 .04"/>
+    <geom type="box" pos="0 0 .03" size=".005 .01 .03"/></body>
+</body></worldbody></mujoco>""")
+    config.write_text("""
+name: gripper
+palm: {body: palm, x: [1, 0, 0], z: [0, 0, 1], grasp_center: [0, 0, 0.06]}
+fingers: {left: [left], right: [right]}
+finger_force: 40
+preshapes: {pinch: {closed: {left: 0.04, right: 0.04}}}
+""")
+    simulator = Simulator(load_hand(model, read_hand_config(config)), "bottle")
+    grasp = simulator.grasp(default_pose(simulator.hand, simulator.object, "right-front", 0.0, (0.0,) * 6), 0.0)
+    assert grasp.quality > 0.005
+    strong = GraspChecker(simulator)
+    assert strong.finger_force == 40.0
+    assert strong.check(grasp).verdict == "held"
+    assert GraspChecker(simulator, finger_force=1.0).check(grasp).verdict == "dropped"
+
+
+def test_repetition_and_threads_change_nothing(bottle, checker):
+    grasps = [grasp_at(bottle, x) for x in (-0.045, -0.032)]
+    once = checker.checks(grasps)
+    assert once == checker.checks(grasps)
+    assert once == GraspChecker(bottle, threads=2).checks(grasps)
+    assert once[1] == checker.check(grasps[1]), "alone or with others"
+
+
+def test_the_verdict_does_not_depend_on_where_the_world_is(bottle, checker):
+    motion = Pose((0.3, -0.2, 0.5), (0.5, 0.5, -0.5, 0.5))
+    there = Simulator(obj="bottle", object_pose=motion)
+    pose = default_pose(bottle.hand, bottle.object, "right-front", 0.0087, (-0.032, *[0.0] * 5))
+    assert checker.check(there.grasp(motion @ pose, -0.7)).verdict == "held"
+
+
+@pytest.mark.parametrize("name", ["bottle", "drill"])
+def test_the_model_weighs_what_the_object_weighs(name):
+    obj = shipped_object(name)
+    model = GraspChecker(Simulator(obj=name)).model
+    mesh = trimesh.Trimesh(obj.vertices, obj.faces, process=False)
+    mesh.density = obj.mass / mesh.volume
+    assert model.body_mass[-1] == pytest.approx(obj.mass)
+    np.testing.assert_allclose(model.body_ipos[-1], mesh.center_mass, atol=1e-9)
+    np.testing.assert_allclose(np.sort(model.body_inertia[-1]), np.sort(mesh.principal_inertia_components), rtol=1e-6)
+
+
+def test_the_fingers_of_the_model_are_those_of_the_hand(bottle, checker):
+    import mujoco
+
+    from surehold.grasping.hand.model import link_ends
+
+    grasp = grasp_at(bottle, -0.032)
+    data = mujoco.MjData(checker.model)
+    mujoco.mj_setState(checker.model, data, checker._state(grasp), mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    mujoco.mj_forward(checker.model, data)
+    ends = link_ends(bottle.hand.bases, bottle.hand.chains, grasp.joints)
+    capsules = np.flatnonzero(checker.model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE)
+    np.testing.assert_allclose(data.geom_xpos[capsules], ends.mean(axis=1), atol=1e-9)
+    np.testing.assert_allclose(
+        2.0 * checker.model.geom_size[capsules, 1], np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), atol=1e-9
+    )
+    assert np.all(data.contact.dist > -5e-4), "the closed grasp touches and does not press"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"finger_force": 0.0}, "finger_force is 0.0"),
+        ({"finger_force": float("nan")}, "finger_force is nan"),
+        ({"mass": -1.0}, "mass is -1.0"),
+        ({"threads": 0}, "threads are 0"),
+    ],
+)
+def test_bad_options_are_explained(bottle, options, words):
+    with pytest.raises(InputError, match=words):
+        GraspChecker(bottle, **options)

@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.optimization.acquisition.criteria import expected_improvement
+from surehold.optimization.acquisition.scales import CRITERIA, Acquisition, criterion_name, where_to_look
+from surehold.optimization.noise.perturbations import BORDERS, Perturbations
+from surehold.optimization.noise.quadratures import exact, sigma_points
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+
+S = np.diag([0.01, 0.0025])
+U = np.array([[0.31, 0.52], [0.8, 0.15], [0.04, 0.97]])
+
+
+def posterior_of(noise):
+    rng = np.random.default_rng(0)
+    X = rng.random((12, 2))
+    return GaussianProcess(noise=noise).fit(X, np.sin(4 * X[:, 0]) * np.cos(3 * X[:, 1])).posterior
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    return posterior_of("none")
+
+
+def acquisition_of(posterior, name, border="extend", best=0.3, k=1.0):
+    named = criterion_name(name)
+    points = exact(2) if named.scale == "exact" else sigma_points(S, k)
+    return Acquisition(posterior, named, Perturbations(points, border), best)
+
+
+@pytest.mark.parametrize("name", CRITERIA)
+@pytest.mark.parametrize("border", BORDERS)
+def test_gradients(name, border, posterior):
+    acquisition = acquisition_of(posterior, name, border)
+    values = acquisition(U)
+    h = 1e-6
+    together, gradients = acquisition.with_gradient(U)
+    np.testing.assert_allclose(together, values, rtol=1e-9, atol=1e-12)
+    for i, u in enumerate(U):
+        steps = h * np.eye(2)
+        numeric = (acquisition(u + steps) - acquisition(u - steps)) / (2 * h)
+        np.testing.assert_allclose(gradients[i], numeric, rtol=1e-4, atol=1e-6)
+
+
+def test_improvement_is_averaged_over_particles(posterior):
+    moments = posterior.moments(U)
+    by_hand = np.mean(
+        [expected_improvement(m, np.sqrt(v), 0.3).value for m, v in zip(moments.mean, moments.variance, strict=True)],
+        axis=0,
+    )
+    np.testing.assert_allclose(acquisition_of(posterior, "ei")(U), by_hand, atol=1e-12)
+    np.testing.assert_allclose(np.exp(acquisition_of(posterior, "log_ei")(U)), by_hand, atol=1e-12)
+
+
+def test_unscented_improvement_by_hand(posterior):
+    """Thesis (3.20): the weighted sum of the improvement at the sigma points."""
+    ei = acquisition_of(posterior, "ei")
+    offsets, weights = sigma_points(S)
+    by_hand = sum(w * ei(U + xi) for w, xi in zip(weights, offsets, strict=True))
+    np.testing.assert_allclose(acquisition_of(posterior, "uei")(U), by_hand, atol=1e-12)
+    np.testing.assert_allclose(np.exp(acquisition_of(posterior, "ulog_ei")(U)), by_hand, atol=1e-12)
+
+
+def test_robust_improvement_by_hand(posterior):
+    offsets, weights = sigma_points(S)
+    g = posterior.average(U, offsets, weights)
+    by_hand = expected_improvement(g.mean, np.sqrt(g.variance), 0.3).value.mean(axis=0)
+    np.testing.assert_allclose(acquisition_of(posterior, "robust_ei")(U), by_hand, atol=1e-12)
+
+
+def test_incumbent_of_each_particle(posterior):
+    best = np.linspace(0.1, 0.5, 10)[:, None]
+    moments = posterior.moments(U)
+    by_hand = expected_improvement(moments.mean, np.sqrt(moments.variance), best).value.mean(axis=0)
+    np.testing.assert_allclose(acquisition_of(posterior, "ei", best=best)(U), by_hand, atol=1e-12)
+
+
+def test_negative_center_weight_gives_minus_infinity_where_the_sum_is_negative(posterior):
+    acquisition = acquisition_of(posterior, "ulog_ei", k=-1.9)
+    grid = np.stack(np.meshgrid(np.linspace(0, 1, 15), np.linspace(0, 1, 15)), axis=-1).reshape(-1, 2)
+    values, plain = acquisition(grid), acquisition_of(posterior, "uei", k=-1.9)(grid)
+    assert np.array_equal(np.isfinite(values), plain > 0.0)
+    assert (plain <= 0.0).any()
+    assert not acquisition.with_gradient(grid[[int(np.argmin(plain))]])[1].any()
+
+
+@pytest.mark.parametrize("noise", ["none", 0.1])
+@pytest.mark.parametrize("u", [*U, [0.5, 0.5]])
+def test_where_to_look_takes_the_trial_that_tells_most(noise, u):
+    posterior = posterior_of(noise)
+    perturbations = Perturbations(sigma_points(S))
+    u, offsets, weights = np.asarray(u), *sigma_points(S)
+    points = where_to_look(posterior, u, perturbations, offsets)
+    assert np.all((points >= 0.0) & (points <= 1.0))
+
+    def variance(model):
+        return model.average(u[None, :], offsets, weights).variance.mean()
+
+    told = np.array([variance(posterior) - variance(posterior.with_pending(point[None, :])) for point in points])
+    told[np.all(points == u, axis=1)] *= 3.0
+    assert np.all(np.diff(told) < 1e-6), "a later point tells more than an earlier one"
+
+
+@pytest.mark.parametrize("name", ["eii", "robust", "", "u", "robust_uei"])
+def test_unknown_name(name):
+    with pytest.raises(InputError, match="is unknown"):
+        criterion_name(name)

@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+from surehold.optimization.maximization import maximize
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.perturbations import BORDERS, Perturbations
+from surehold.optimization.noise.quadratures import gauss_hermite, sigma_points
+from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+
+S = np.diag([0.01, 0.0025])
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    rng = np.random.default_rng(0)
+    X = rng.random((20, 2))
+    return GaussianProcess().fit(X, np.sin(4 * X[:, 0]) * np.cos(3 * X[:, 1])).posterior
+
+
+def test_borders():
+    points = sigma_points(S)
+    U = np.array([[0.05, 0.5]])
+    left = np.sqrt(0.03)
+    expected = {"extend": 0.05 - left, "clip": 0.0, "keep": 0.05}
+    for border in BORDERS:
+        around = Perturbations(points, border).around(U)[0]
+        assert around[3, 0] == pytest.approx(expected[border], abs=1e-12), border
+        np.testing.assert_allclose(around[3, 1], 0.5)
+        np.testing.assert_allclose(around[[0, 1, 2, 4]], (U + points.offsets)[[0, 1, 2, 4]])
+
+
+@pytest.mark.parametrize("border", BORDERS)
+def test_outcome_is_the_average_of_the_spread(border, posterior):
+    perturbations = Perturbations(gauss_hermite(S, 3), border)
+    U = np.array([[0.02, 0.5], [0.5, 0.99], [0.4, 0.6]])
+    outcome = perturbations.outcome(posterior, U)
+    spread, _ = perturbations.spread(posterior, U)
+    average = spread.mean.reshape(-1, 3, 9) @ perturbations.quadrature.weights
+    np.testing.assert_allclose(outcome.mean, average, atol=1e-9)
+
+
+@pytest.mark.parametrize("border", BORDERS)
+def test_gradients(border, posterior):
+    perturbations = Perturbations(sigma_points(S), border)
+    U = np.array([[0.05, 0.5], [0.5, 0.97], [0.4, 0.6]])
+    h = 1e-6
+    found = perturbations.outcome(posterior, U, gradient=True)
+    for k, step in enumerate(h * np.eye(2)):
+        up, down = perturbations.outcome(posterior, U + step), perturbations.outcome(posterior, U - step)
+        np.testing.assert_allclose(found.mean_gradient[:, :, k], (up.mean - down.mean) / (2 * h), atol=1e-5)
+        np.testing.assert_allclose(found.variance_gradient[:, :, k], (up.variance - down.variance) / (2 * h), atol=1e-5)
+    spread, slopes = perturbations.spread(posterior, U, gradient=True)
+    slopes = np.ones((3, 5, 2)) if slopes is None else slopes
+    for k, step in enumerate(h * np.eye(2)):
+        up, down = perturbations.spread(posterior, U + step)[0], perturbations.spread(posterior, U - step)[0]
+        chain = spread.mean_gradient[:, :, k] * slopes[:, :, k].ravel()
+        np.testing.assert_allclose(chain, (up.mean - down.mean) / (2 * h), atol=1e-5)
+
+
+def test_average_of_the_model_by_plain_sampling(posterior):
+    rng = np.random.default_rng(1)
+    u = np.array([0.4, 0.5])
+    small = S / 4
+    mean = Perturbations(gauss_hermite(small, 7)).outcome(posterior, u[None, :]).mean[:, 0]
+    draws = posterior.moments(u + rng.multivariate_normal(np.zeros(2), small, 40_000)).mean
+    assert np.all(np.abs(draws.mean(axis=1) - mean) < 5 * draws.std(axis=1) / 200)
+
+
+def test_unknown_border():
+    with pytest.raises(InputError, match="extend"):
+        Perturbations(sigma_points(S), "bounce")
+
+
+def test_perturbations_of_noise_that_varies_follow_it():
+    box = Box({"a": (0.0, 2.0), "b": (0.0, 1.0)})
+    noise = InputNoise.varying(lambda x: [0.1 + 0.1 * x[0], 0.0])
+    perturbations = Perturbations.of(noise, box, "unscented")
+    around = perturbations.around(np.array([[0.0, 0.5], [1.0, 0.5]]))
+    np.testing.assert_allclose(around[0, :, 0], [0.0, 0.05 * 2**0.5, -0.05 * 2**0.5], atol=1e-12)
+    np.testing.assert_allclose(around[1, :, 0], [1.0, 1.0 + 0.15 * 2**0.5, 1.0 - 0.15 * 2**0.5], atol=1e-12)
+    np.testing.assert_allclose(around[:, :, 1], 0.5)
+
+
+@pytest.mark.parametrize("noise", ["uniform", "varying"])
+def test_the_safe_hill_is_found_under_other_kinds_of_noise(noise):
+    """A spike at 0.2 and a hill at 0.7; where the noise is small, the spike is worth its height."""
+
+    def f(x):
+        return float(1.5 * np.exp(-0.5 * ((x[0] - 0.2) / 0.01) ** 2) + np.exp(-0.5 * ((x[0] - 0.7) / 0.1) ** 2))
+
+    box = Box({"x": (0.0, 1.0)})
+    kinds = {
+        "uniform": InputNoise.uniform({"x": 0.06}),
+        "varying": InputNoise.varying(lambda x: {"x": 1e-4 if x[0] < 0.5 else 0.05}),
+    }
+    result = maximize(f, box, n_trials=45, input_noise=kinds[noise], seed=0)
+    wanted = {"uniform": 0.7, "varying": 0.2}[noise]
+    assert result.recommendation.x[0] == pytest.approx(wanted, abs=0.03)
+
+
+def test_noise_larger_than_the_box_is_warned_of():
+    with pytest.warns(UserWarning, match="standard deviation of 3, 0.6 times the box"):
+        Optimizer(Box({"dx": (0.0, 5.0)}), input_noise=InputNoise({"dx": 3.0}))

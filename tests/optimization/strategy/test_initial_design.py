@@ -1,0 +1,34 @@
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.optimization.strategy.initial_design import DESIGNS, design
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+@pytest.mark.parametrize(("n", "d"), [(1, 1), (5, 1), (7, 3), (40, 2), (64, 7)])
+def test_points_of_the_cube_and_reproducible(name, n, d):
+    points = design(name, n, d, np.random.default_rng(3))
+    assert points.shape == (n, d)
+    assert np.all((points >= 0.0) & (points <= 1.0))
+    assert np.array_equal(points, design(name, n, d, np.random.default_rng(3)))
+    assert not np.array_equal(points, design(name, n, d, np.random.default_rng(4)))
+
+
+def test_latin_hypercube_has_one_point_a_slice():
+    points = design("latin_hypercube", 30, 4, np.random.default_rng(0))
+    slices = np.sort(np.floor(points * 30), axis=0)
+    assert np.array_equal(slices, np.repeat(np.arange(30.0)[:, None], 4, axis=1))
+
+
+def test_sobol_covers_better_than_chance():
+    from scipy.stats import qmc
+
+    even = qmc.discrepancy(design("sobol", 64, 2, np.random.default_rng(0)))
+    chance = np.mean([qmc.discrepancy(np.random.default_rng(i).random((64, 2))) for i in range(20)])
+    assert even < 0.2 * chance
+
+
+def test_unknown_name():
+    with pytest.raises(InputError, match="latin_hypercube"):
+        design("grid", 3, 2, np.random.default_rng(0))

@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+
+import surehold as sh
+from surehold.errors import InputError
+from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.acquisition.scales import criterion_name
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.noise.quadratures import exact
+from surehold.optimization.strategy.goal import Goal
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+
+GM = sh.problems.GM()
+NOISE = sh.InputNoise.unit(0.1)
+
+
+def found(n_trials, batch=4, **settings):
+    optimizer = sh.Optimizer(GM.box, n_initial=20, seed=1, **settings)
+    while len(optimizer.y) < n_trials:
+        batches = optimizer.ask(batch)
+        assert len(np.unique(np.round(batches, 6), axis=0)) == batch, "one batch holds a point twice"
+        for x in batches:
+            optimizer.tell(x, float(GM(x)))
+    return optimizer
+
+
+@pytest.mark.parametrize("surrogate", ["gp", "tgp"])
+def test_outcomes_drawn_under_noise_lead_to_the_safe_hill(surrogate):
+    optimizer = found(72, criterion="robust_thompson", input_noise=NOISE, surrogate=surrogate)
+    assert GM.expectation(optimizer.recommend().x, NOISE) > 0.094
+
+
+def test_functions_drawn_without_noise_lead_to_the_peak():
+    assert found(80, criterion="thompson").y.max() > 0.1355
+
+
+def test_repeats_itself_and_needs_noise_where_it_says_so():
+    first, second = (found(28, criterion="thompson") for _ in range(2))
+    np.testing.assert_array_equal(first.X, second.X)
+    with pytest.raises(InputError, match="input noise"):
+        sh.Optimizer(GM.box, criterion="robust_thompson")
+
+
+def test_a_point_is_taken_as_often_as_it_is_the_maximum():
+    """One particle, one input: the share of draws whose maximum is left of 0.5 is that of draws by NumPy."""
+    X = np.array([[0.0], [0.2], [0.5], [0.8], [1.0]])
+    y = np.array([0.0, 1.0, 0.0, 0.9, 0.0])
+    fixed = {"length_scales": [0.15], "signal_variance": 1.0, "standardize": False}
+    posterior = GaussianProcess(**fixed).fit(X, y).posterior
+    perturbations = Perturbations(exact(1))
+    goal = Goal(criterion_name("thompson"), perturbations, perturbations, Risk(), 0.0, 2.0, True, False, len(X), False)
+    taken = [
+        goal.candidates(posterior, X, y, np.empty((0, 1)), np.empty((0, 1)), np.random.default_rng(seed))[0, 0]
+        for seed in range(300)
+    ]
+    grid = np.linspace(0.0, 1.0, 201)[:, None]
+    mean = posterior.moments(grid).mean[0]
+    joint = posterior.sample(grid[None], np.eye(201))[0, 0] - mean  # rows: columns of a root of the covariance
+    draws = mean + np.random.default_rng(0).standard_normal((20_000, 201)) @ joint
+    share = np.mean(grid[draws.argmax(axis=1), 0] < 0.5)
+    assert np.mean(np.array(taken) < 0.5) == pytest.approx(share, abs=4.0 * np.sqrt(share * (1.0 - share) / 300))

@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal, norm
+
+import surehold as sh
+from surehold.errors import InputError
+from surehold.optimization.noise.quadratures import sigma_points
+from surehold.optimization.surrogates.gaussian_process.kernels import correlation
+from surehold.optimization.surrogates.local_global import LocalGlobalProcess, log_posterior
+
+RNG = np.random.default_rng(0)
+X = RNG.random((18, 2))
+Y = np.sin(9.0 * X.sum(axis=1)) * X[:, 0]
+Q = RNG.random((5, 2))
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    return LocalGlobalProcess().condition(X, Y, np.random.default_rng(1))
+
+
+def shares(P, center):
+    """The definition, by SciPy's densities: sqrt(w_j / (w_g + w_l))."""
+    wide = norm.pdf(P, 0.5, 10.0).prod(axis=1)
+    narrow = norm.pdf(P, center, 0.05).prod(axis=1)
+    return np.sqrt(wide / (wide + narrow)), np.sqrt(narrow / (wide + narrow))
+
+
+def covariance(P, R, particle):
+    (gp, lp), (gr, lr) = shares(P, particle.center), shares(R, particle.center)
+    wide, narrow = 1.0 / particle.inverse_l
+    return particle.s2 * (
+        np.outer(gp, gr) * correlation("matern52", P, R, wide)
+        + np.outer(lp, lr) * correlation("matern52", P, R, narrow)
+    )
+
+
+def test_moments_by_textbook_algebra(posterior):
+    offsets, weights = sigma_points(0.003 * np.eye(2))
+    found = posterior.average(Q, offsets, weights)
+    for j, particle in enumerate(posterior._particles):
+        A = covariance(X, X, particle) + 1e-10 * particle.s2 * np.eye(len(X))
+        for i, q in enumerate(Q):
+            P = q + offsets
+            K = weights @ covariance(P, X, particle)
+            mean = posterior._outputs.shift + posterior._outputs.scale * K @ np.linalg.solve(
+                A, posterior._outputs.apply(Y)
+            )
+            variance = weights @ covariance(P, P, particle) @ weights - K @ np.linalg.solve(A, K)
+            assert found.mean[j, i] == pytest.approx(mean, abs=1e-6)
+            assert found.variance[j, i] == pytest.approx(posterior._outputs.square * variance, abs=1e-6)
+
+
+def test_density_of_the_hyperparameters(posterior):
+    particle = posterior._particles[0]
+    theta = np.concatenate([-np.log(particle.inverse_l).ravel(), [np.log(particle.s2)], particle.center])
+    evidence = sh.GaussianProcess().fit(X, Y).posterior.evidence
+    extended = evidence._replace(prior_mean=np.zeros(7), prior_deviation=np.full(7, 2.0))
+    A = covariance(X, X, particle) + 1e-10 * particle.s2 * np.eye(len(X))
+    expected = multivariate_normal(np.zeros(len(X)), A, allow_singular=True).logpdf(evidence.y)
+    expected -= 0.5 * np.square(theta[:5] / 2.0).sum()
+    assert log_posterior(theta, extended) == pytest.approx(expected, rel=1e-6)
+    outside = theta.copy()
+    outside[-1] = 1.2
+    assert log_posterior(outside, extended) == -np.inf
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_gradients(many, posterior):
+    offsets, weights = sigma_points(0.003 * np.eye(2)) if many else (np.zeros((1, 2)), np.ones(1))
+    found = posterior.average(Q, offsets, weights, gradient=True)
+    h = 1e-6
+    for k in range(2):
+        step = h * np.eye(2)[k]
+        up, down = posterior.average(Q + step, offsets, weights), posterior.average(Q - step, offsets, weights)
+        np.testing.assert_allclose(found.mean_gradient[..., k], (up.mean - down.mean) / (2 * h), rtol=1e-4, atol=1e-5)
+        np.testing.assert_allclose(
+            found.variance_gradient[..., k], (up.variance - down.variance) / (2 * h), rtol=1e-4, atol=1e-5
+        )
+
+
+def test_interpolates_samples_and_repeats_itself(posterior):
+    np.testing.assert_allclose(posterior.moments(X).mean, np.broadcast_to(Y, (10, 18)), atol=1e-4)
+    draws = posterior.sample(Q[None], np.random.default_rng(2).standard_normal((20_000, 5)))[:, 0]
+    moments = posterior.moments(Q)
+    np.testing.assert_allclose(draws.mean(axis=1), moments.mean, atol=0.02)
+    np.testing.assert_allclose(draws.var(axis=1), moments.variance, rtol=0.06, atol=1e-6)
+    again = LocalGlobalProcess().condition(X, Y, np.random.default_rng(1)).moments(Q)
+    np.testing.assert_array_equal(again.mean, moments.mean)
+
+
+def test_pending_trials_leave_the_mean_alone_and_take_the_variance(posterior):
+    waiting = posterior.with_pending(Q[:2])
+    np.testing.assert_allclose(waiting.moments(Q).mean, posterior.moments(Q).mean, atol=1e-5)
+    assert waiting.moments(Q[:2]).variance.max() < 1e-6
+
+
+def test_finds_the_needle_of_a_function_that_is_smooth_elsewhere():
+    problem = sh.problems.RKHS()
+    for seed in range(2):
+        optimizer = sh.Optimizer(problem.box, n_initial=5, seed=seed, surrogate="local_global")
+        for _ in range(40):
+            x = optimizer.ask()
+            optimizer.tell(x, float(problem(x)))
+        assert optimizer.y.max() > 5.68
+    assert optimizer.recommend().observed == optimizer.y.max()
+
+
+def test_flat_data_and_one_trial():
+    for y in (np.zeros(6), np.array([2.0])):
+        found = LocalGlobalProcess().condition(X[: len(y)], y, np.random.default_rng(0)).moments(Q)
+        assert np.isfinite(found.mean).all()
+        assert np.isfinite(found.variance).all()
+
+
+@pytest.mark.parametrize("settings", [{"noise": "inferred"}, {"noise": 0.1}, {"preset": "thesis"}])
+def test_settings_that_it_has_not_are_refused(settings):
+    with pytest.raises(InputError, match="local_global"):
+        sh.Optimizer(sh.Box.unit(2), surrogate="local_global", **settings)

@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+
+
+def growing(X):
+    """Standard deviation of the noise, ten times larger at 1 than at 0."""
+    return 0.05 + 0.5 * X[:, 0] ** 2
+
+
+def noisy_data(n, seed):
+    rng = np.random.default_rng(seed)
+    X = rng.random((n, 1))
+    return X, 4.0 + np.sin(6 * X[:, 0]) + growing(X) * rng.standard_normal(n)
+
+
+def test_known_noise_of_each_observation_equals_scikit_learn():
+    X, y = noisy_data(30, 0)
+    noise = growing(X)
+    Q = np.random.default_rng(1).random((9, 1))
+    reference = GaussianProcessRegressor(
+        ConstantKernel(1.3) * Matern(0.3, nu=2.5), alpha=(noise / y.std()) ** 2, optimizer=None, normalize_y=True
+    ).fit(X, y)
+    ours = GaussianProcess(length_scales=[0.3], signal_variance=1.3, ratio=0.0).fit(X, y, noise=noise)
+    for found, expected in zip(ours.predict(Q, True), reference.predict(Q, return_std=True), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-8)
+    np.testing.assert_allclose(ours.noise_std(Q), np.sqrt(np.mean(noise**2)))
+
+
+def test_precise_observations_count_for_more():
+    X, y = [[0.5], [0.5]], [0.0, 1.0]
+    mean = GaussianProcess(standardize=False, signal_variance=100.0, length_scales=[1.0]).fit(X, y, noise=[0.1, 0.2])
+    assert mean.predict([[0.5]]) == pytest.approx(0.2, abs=1e-3)
+
+
+@pytest.mark.parametrize("noise", [0.3, "inferred", "none"])
+def test_noise_std_is_what_was_said_or_learnt(noise):
+    rng = np.random.default_rng(2)
+    X = rng.random((150, 1))
+    y = np.sin(6 * X[:, 0]) + (0.0 if noise == "none" else 0.3) * rng.standard_normal(150)
+    found = GaussianProcess(noise=noise).fit(X, y).noise_std([[0.1], [0.8]])
+    if noise == "inferred":
+        np.testing.assert_allclose(found, 0.3, rtol=0.15)
+    else:
+        np.testing.assert_allclose(found, 0.0 if noise == "none" else noise)
+
+
+def test_heteroscedastic_noise_is_found():
+    Q = np.linspace(0.05, 0.95, 10)[:, None]
+    ratios = []
+    for seed in range(4):
+        X, y = noisy_data(200, seed)
+        ratios.append(GaussianProcess(noise="heteroscedastic").fit(X, y, seed).noise_std(Q) / growing(Q))
+    average = np.exp(np.mean(np.log(ratios), axis=0))
+    np.testing.assert_array_less(average, 1.3)
+    np.testing.assert_array_less(0.7, average)
+
+
+def test_heteroscedastic_noise_predicts_better_than_one_common_level():
+    T = np.linspace(0.0, 1.0, 100)[:, None]
+    truth, noise = 4.0 + np.sin(6 * T[:, 0]), growing(T)
+
+    def loss(model):
+        """Expected negative log density of a new observation."""
+        mean, std = model.predict(T, return_std=True)
+        variance = std**2 + model.noise_std(T) ** 2
+        return np.mean(0.5 * np.log(variance) + 0.5 * ((mean - truth) ** 2 + noise**2) / variance)
+
+    gains = []
+    for seed in range(4):
+        X, y = noisy_data(100, seed)
+        plain, local = (GaussianProcess(noise=name).fit(X, y) for name in ("inferred", "heteroscedastic"))
+        gains.append(loss(plain) - loss(local))
+    assert min(gains) > 0.1
+
+
+def test_common_noise_is_not_taken_for_a_pattern():
+    rng = np.random.default_rng(3)
+    X = rng.random((150, 2))
+    y = X.sum(axis=1) + 0.2 * rng.standard_normal(150)
+    found = GaussianProcess(noise="heteroscedastic").fit(X, y).noise_std(rng.random((50, 2)))
+    assert np.all((found > 0.1) & (found < 0.4))
+    assert np.median(found) == pytest.approx(0.2, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("X", "y"),
+    [
+        ([[0.5]], [1.0]),
+        ([[0.5], [0.5]], [1.0, 2.0]),
+        (np.linspace(0, 1, 8)[:, None], np.ones(8)),
+        (np.linspace(0, 1, 8)[:, None], np.linspace(0, 1, 8)),
+        (np.linspace(0, 1, 8)[:, None], [0.0] * 7 + [1e9]),
+    ],
+)
+def test_hard_data(X, y):
+    model = GaussianProcess(noise="heteroscedastic").fit(X, y)
+    for values in (*model.predict(X, return_std=True), model.noise_std(X)):
+        assert np.isfinite(values).all()
+
+
+def test_optimizer_with_noise_that_differs():
+    rng = np.random.default_rng(4)
+    optimizer = Optimizer(Box.unit(1), noise="heteroscedastic", n_initial=10, seed=0)
+    for _ in range(25):
+        x = optimizer.ask()
+        optimizer.tell(x, -4.0 * (x[0] - 0.4) ** 2 + growing(x[None, :])[0] * rng.standard_normal())
+    optimizer.ask(2)
+    assert abs(optimizer.recommend("box").x[0] - 0.4) < 0.25
+
+
+@pytest.mark.parametrize("noise", [[0.1], [0.1, -0.1], [0.1, np.nan], "much", [[0.1, 0.1]]])
+def test_bad_noise_of_observations(noise):
+    with pytest.raises(InputError, match="noise"):
+        GaussianProcess().fit([[0.1], [0.9]], [0.0, 1.0], noise=noise)
+
+
+def test_bad_noise_setting():
+    with pytest.raises(InputError, match="heteroscedastic"):
+        GaussianProcess(noise="heteroskedastic")
+    with pytest.raises(InputError, match="standard deviation"):
+        GaussianProcess(noise=[0.1, 0.2])

@@ -1,0 +1,135 @@
+import pickle
+
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.grasping import MODES, Simulator, default_pose, shipped_object
+from surehold.problems.grasp.default_poses import GraspDefault, grasp_default, search_default
+from surehold.problems.grasp.problem import VARIABLES, Grasp
+from surehold.problems.problem import Problem
+
+
+@pytest.fixture(scope="module")
+def mug():
+    return Grasp("mug", facet="right-front")
+
+
+def test_default_problem_is_dx_and_dy_of_the_published_bounds(mug):
+    assert isinstance(mug, Problem)
+    assert mug.box.names == ("dx", "dy")
+    assert mug.units == ("m", "m")
+    half = shipped_object("mug").box_half_extents
+    np.testing.assert_allclose(mug.box.upper, [half[1] + 0.025, half[2]])
+    np.testing.assert_allclose(mug.box.lower, -mug.box.upper)
+
+
+def test_value_is_the_quality_of_the_grasp(mug):
+    x = [-0.057, 0.002]
+    grasp = mug.grasp(x)
+    assert grasp.status == "ok"
+    assert mug(x) == grasp.quality > 0.05
+    assert mug([0.0, 0.0]) < 0.0, "the open hand collides"
+    np.testing.assert_array_equal(mug([x, [0.0, 0.0]]), [grasp.quality, mug([0.0, 0.0])])
+    pose = default_pose(mug.simulator.hand, mug.object, "right-front", mug.default.standoff, [*x, 0, 0, 0, 0])
+    assert mug.simulator.grasp(pose, mug.default.s1).quality == grasp.quality
+
+
+def test_variables_in_any_subset_and_order_mean_the_same(mug):
+    names = tuple(reversed(VARIABLES))
+    every = Grasp("mug", variables=names)
+    assert every.box.names == names
+    assert every.units == tuple(VARIABLES[name] for name in names)
+    x = {"dx": -0.057, "dy": 0.002, "s1": mug.default.s1} | dict.fromkeys(["dz", "rx", "ry", "rz"], 0.0)
+    assert every([x[name] for name in names]) == mug([-0.057, 0.002])
+    one = Grasp("mug", variables="dx", fixed={"dy": 0.002})
+    assert one([-0.057]) == mug([-0.057, 0.002])
+    closer = Grasp("mug", variables=["dx", "dz"], fixed={"dy": 0.002})
+    assert closer([-0.057, -0.01]) != one([-0.057])
+
+
+def test_dz_spans_the_published_distances():
+    p = Grasp("mug", variables=("dz",))
+    depth = shipped_object("mug").box_half_extents[0]
+    nearest, farthest = p.default.standoff - p.box.upper[0], p.default.standoff - p.box.lower[0]
+    assert nearest == pytest.approx(depth / 3)
+    assert farthest == pytest.approx(depth / 3 + 0.040 * (1 + depth / 0.050))
+
+
+def test_default_starts_30_to_70_percent_free_of_collision(mug):
+    rng = np.random.default_rng(0)
+    points = mug.box.from_unit(rng.uniform(size=(300, 2)))
+    status = [mug.grasp(x).status for x in points]
+    free = np.mean([s != "initial collision" for s in status])
+    assert 0.25 < free < 0.75
+    assert status.count("ok") > 20
+
+
+def test_table_of_defaults_repeats_the_search(mug):
+    assert search_default(mug.simulator, "right-front") == pytest.approx(mug.default, abs=1e-4)
+    assert all(isinstance(grasp_default(mug.simulator, mode), GraspDefault) for mode in MODES)
+
+
+def test_pickled_problem_gives_the_same_and_is_small(mug):
+    text = pickle.dumps(mug)
+    assert len(text) < 2_000_000, "the distance field is not sent along"
+    again = pickle.loads(text)
+    assert again.box == mug.box
+    assert again([-0.057, 0.002]) == mug([-0.057, 0.002])
+
+
+def test_options_reach_the_simulator():
+    p = Grasp("mug", contact="single", closing="synergy", friction=0.8)
+    assert isinstance(p.simulator, Simulator)
+    assert (p.simulator.contact, p.simulator.closing, p.simulator.friction) == ("single", "synergy", 0.8)
+    narrow = Grasp("mug", bounds={"dx": (-0.07, -0.05)})
+    np.testing.assert_allclose([narrow.box.lower[0], narrow.box.upper[0]], [-0.07, -0.05])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"obj": "mugg"}, "did you mean 'mug'"),
+        ({"facet": "lefft-front"}, "did you mean 'left'"),
+        ({"facet": "right"}, "right-front"),
+        ({"variables": ("dx", "dw")}, "variable 'dw' is unknown"),
+        ({"variables": ("dx", "dx")}, "each once"),
+        ({"variables": ()}, "name one or more"),
+        ({"bounds": {"dz": (0.0, 0.1)}}, "not free"),
+        ({"bounds": {"dx": (0.1, 0.0)}}, "lower must be smaller"),
+        ({"fixed": {"dx": 0.1}}, "both free and fixed"),
+        ({"fixed": {"s1": float("nan")}}, "finite"),
+        ({"contact": "soft"}, "contact model"),
+    ],
+)
+def test_bad_options_are_explained(options, words):
+    with pytest.raises(InputError, match=words):
+        Grasp(**options)
+
+
+def test_bad_points_are_explained(mug):
+    with pytest.raises(InputError, match="dx, dy"):
+        mug([0.0, 0.0, 0.0])
+    with pytest.raises(InputError, match="finite"):
+        mug([0.0, float("nan")])
+    with pytest.raises(InputError, match="one point"):
+        mug.grasp([[0.0, 0.0], [0.01, 0.0]])
+
+
+def test_the_thesis_preset_is_the_original_experiment():
+    problem = Grasp("bottle", variables=("dx", "s1"), preset="thesis")
+    assert (problem.simulator.contact, problem.simulator.quality) == ("single", "simox")
+    assert (problem.simulator.closing, problem.simulator.collision) == ("synergy", "zero")
+    assert problem.box.upper[1] == pytest.approx(np.pi)
+    assert 0.1 < problem([-0.03, -0.7]) < 1.0
+    with pytest.raises(InputError, match="preset 'theses' is unknown"):
+        Grasp("bottle", preset="theses")
+
+
+def test_the_default_facet_of_the_drill_has_a_grasp_that_holds():
+    drill = Grasp("drill")
+    assert (Grasp("mug").facet, drill.facet) == ("right-front", "bottom-front")
+    best = np.array([-0.018, -0.036])
+    around = [drill(best + step) for step in 0.003 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])]
+    assert drill(best) > 0.1
+    assert min(around) > 0.1
