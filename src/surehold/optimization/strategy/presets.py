@@ -5,56 +5,17 @@ a problem; plain "thesis" takes a signal variance of 1 and no bias. Chains of hy
 the next, as in the original program: a run rebuilt from its history proposes other points than the run itself.
 """
 
-from math import inf
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surehold.errors import unknown_name
-from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, Prior
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
-from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
+from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, least_leaf_width
 
-__all__ = ["THESIS", "TREED", "Thesis", "TreedSettings", "thesis_preset"]
-
-
-class TreedSettings(NamedTuple):
-    """Settings of the tree inside an optimizer."""
-
-    min_leaf: int | Literal["evidence"]
-    """smallest number of trials in a leaf"""
-    weight_power: float = inf
-    """by how much the trials of a leaf's ancestors count less"""
-    continued: bool = False
-    """whether chains continue from step to step"""
-    trees: int = 1
-    """trees that are averaged"""
-
-    def surrogate(
-        self, process: GaussianProcess, box: Box, input_noise: InputNoise | None, seed: int
-    ) -> TreedGaussianProcess:
-        """Return the tree of such processes.
-
-        No leaf is narrower than the input noise's standard deviation, or 0.01 box widths where there is none.
-        """
-        margin = np.full(box.dimension, 0.01)
-        if input_noise is not None:
-            deviation = np.sqrt(np.diag(input_noise.unit_covariance(box)))
-            margin = np.where(deviation > 0.0, np.minimum(deviation, 0.49), margin)
-        return TreedGaussianProcess(
-            self.min_leaf,
-            self.weight_power,
-            process=process,
-            trees=self.trees,
-            margin=margin,
-            continued=self.continued,
-            seed=seed,
-        )
-
-
-TREED: Final = TreedSettings(min_leaf=15)
+__all__ = ["THESIS", "Thesis", "thesis_preset"]
 
 
 class Thesis(NamedTuple):
@@ -78,6 +39,20 @@ class Thesis(NamedTuple):
             prior=Prior(log_length_scale=(1.0, 10.0)),
             learning=Learning("slice", particles=10, burn_in=100, thin=1, width=6.0),
         )
+
+    def tree(self, input_deviations: NDArray[np.float64], seed: int = 0, **changes: Any) -> TreedGaussianProcess:
+        """Return the thesis' treed Gaussian process; arguments as of `surrogate_named`, `changes` of the tree."""
+        settings = {"min_leaf": self.min_leaf, "continued": True, **changes}
+        margin = least_leaf_width(input_deviations)
+        return TreedGaussianProcess(process=self.gaussian_process(), margin=margin, seed=seed, **settings)
+
+    def surrogate(
+        self, name: str, input_deviations: NDArray[np.float64], seed: int = 0
+    ) -> GaussianProcess | TreedGaussianProcess:
+        """Return the thesis' surrogate of that name, "gp" or "tgp"; raises InputError for another one."""
+        if name not in ("gp", "tgp"):
+            raise unknown_name("surrogate of a thesis preset", name, ("gp", "tgp"))
+        return self.gaussian_process() if name == "gp" else self.tree(input_deviations, seed)
 
 
 THESIS: Final = {
