@@ -29,5 +29,6 @@ def require(extra: str, part: str) -> None:
     """Raise MissingExtra if a module of the extra is not installed; `part` names what needs it. Imports nothing."""
     missing = [module for module in EXTRAS[extra] if find_spec(module) is None]
     if missing:
-        needed = " and ".join(missing)
-        raise MissingExtra(f"{part} needs {needed}, not installed here; run: pip install 'surehold[{extra}]'.")
+        raise MissingExtra(
+            f"{part} needs {', '.join(missing)}, not installed here; run: pip install 'surehold[{extra}]'."
+        )

@@ -203,6 +203,15 @@ def test_doctor_version_and_help(capsys):
     assert "--facet" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("group", "command"), [("", "maximize"), ("campaign", "report"), ("study", "recommend")])
+def test_a_group_alone_prints_its_help(group, command, capsys):
+    assert surehold(group) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert captured.out.startswith(f"Usage: surehold {group}".rstrip())
+    assert any(line.split()[:1] == [command] for line in captured.out.splitlines())
+
+
 def test_the_module_is_the_command(here):
     done = subprocess.run(
         [sys.executable, "-m", "surehold", "maximize", "nothing"], capture_output=True, text=True, check=False

@@ -158,9 +158,11 @@ def _spread(tasks: Sequence[Task], workers: int, kind: str, backend: str) -> Ite
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+    settings: dict[str, Any] = {"n_jobs": workers, "batch_size": 1, "pre_dispatch": workers}
+    settings["return_as"] = "generator_unordered"
     try:
         with _cluster(kind, checked_backend(backend)[1], workers):
-            parallel = Parallel(workers, batch_size=1, pre_dispatch=workers, return_as="generator_unordered")
+            parallel = Parallel(**settings)
             yield from cast(Iterator[dict[str, Any]], parallel(delayed(run_once)(*task) for task in tasks))
     except TerminatedWorkerError:
         raise SureholdError(

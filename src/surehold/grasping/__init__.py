@@ -4,5 +4,5 @@ import lazy_loader
 
 from surehold.extras import require
 
-require("grasp", "grasping")
+require("grasp", "surehold.grasping")
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

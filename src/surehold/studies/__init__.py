@@ -4,5 +4,5 @@ import lazy_loader
 
 from surehold.extras import require
 
-require("study", "studies")
+require("study", "surehold.studies")
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
