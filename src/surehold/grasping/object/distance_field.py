@@ -20,13 +20,13 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.solids import signed_distance
 from surehold.store.atomic import replacing
+from surehold.store.kernels import njit
 
 __all__ = [
     "DistanceField",
