@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from surehold.extras import EXTRAS
+from surehold.extras import EXTRAS, MODULES
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
-BEYOND_THE_CORE = sorted({module for modules in EXTRAS.values() for module in modules})
+BEYOND_THE_CORE = sorted({MODULES.get(name, name) for names in EXTRAS.values() for name in names})
 
 #: every module beyond the core is as if it were not installed
 BLOCKED = f"import sys\nfor name in {BEYOND_THE_CORE}: sys.modules[name] = None\n"
@@ -31,15 +31,6 @@ assert sh.maximize(lambda x: -abs(float(x[0])), box, 6, n_initial=5).recommendat
 assert sh.problems.RKHS()([0.5]) is not None
 print("works")
 """
-
-#: distributions that are not named as their module
-NAMES = {
-    "yaml": "pyyaml",
-    "igl": "libigl",
-    "optuna_dashboard": "optuna-dashboard",
-    "sklearn": "scikit-learn",
-    "distributed": "dask",
-}
 
 DOORS = {
     "grasp": "surehold.problems.Grasp",
@@ -86,21 +77,14 @@ def test_the_command_line_says_it_in_one_line(arguments, blocked, extra):
     assert done.stderr.count("\n") == 1
 
 
-def test_the_modules_of_an_extra_are_those_of_its_distributions():
+def test_the_packages_of_an_extra_are_those_of_the_project_file():
     """What an extra takes from another one is asked for at that one's door."""
-    for extra, modules in EXTRAS.items():
-        own = {_distribution(line) for line in PROJECT["optional-dependencies"][extra]} - {"surehold"}
-        assert {NAMES.get(module, module) for module in modules} == own, extra
+    for extra, names in EXTRAS.items():
+        listed = {re.match(r"[\w-]+", line)[0] for line in PROJECT["optional-dependencies"][extra]}
+        assert set(names) == listed - {"surehold"}, extra
 
 
 def test_all_is_all():
     extras = set(PROJECT["optional-dependencies"]) - {"all", "dev", "peers"}
-    assert extras == set(_own_extras(PROJECT["optional-dependencies"]["all"][0])) == set(EXTRAS)
-
-
-def _distribution(line):
-    return re.match(r"[\w-]+", line)[0].lower()
-
-
-def _own_extras(line):
-    return re.fullmatch(r"surehold\[(.*)\]", line)[1].split(",")
+    assert extras == set(EXTRAS)
+    assert PROJECT["optional-dependencies"]["all"] == [f"surehold[{','.join(sorted(extras))}]"]

@@ -53,9 +53,10 @@ def njit(*signatures: Any, cache: bool = True, **options: Any) -> Any:
 
 
 def _saving_where_possible(dispatcher: Any) -> Any:
-    if config.DISABLE_JIT:
+    kept = getattr(dispatcher, "_cache", None)
+    if kept is None:  # NUMBA_DISABLE_JIT gives the function back
         return dispatcher
-    save = dispatcher._cache.save_overload
+    save = kept.save_overload
 
     def save_overload(*arguments: Any) -> None:
         try:
@@ -63,7 +64,7 @@ def _saving_where_possible(dispatcher: Any) -> Any:
         except OSError as error:  # the function itself is compiled and works
             _say_once(error)
 
-    dispatcher._cache.save_overload = save_overload
+    kept.save_overload = save_overload
     return dispatcher
 
 
