@@ -6,7 +6,7 @@ For n up to a few hundred, calls of LAPACK from compiled code cost more than the
 
 from math import sqrt
 
-from numba import njit
+from surehold.store.kernels import njit
 
 __all__ = ["cholesky", "invert_lower", "solve_lower", "solve_lower_transposed"]
 

@@ -1,7 +1,8 @@
 """The exponential function for arguments in [-700, 0], in a form that compilers turn into SIMD code (compiled)."""
 
 import numpy as np
-from numba import njit
+
+from surehold.store.kernels import njit
 
 __all__ = ["exponential"]
 

@@ -18,10 +18,11 @@ from math import cos, log, pi, sin, sqrt
 from typing import Any, Final
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numpy.typing import NDArray
 
 from surehold.optimization.samplers.slice import SliceSamples, compiled_for
+from surehold.store.kernels import njit
 
 __all__ = ["elliptical_slice_sample"]
 

@@ -12,8 +12,10 @@ from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, typeof, types
+from numba import typeof, types
 from numpy.typing import NDArray
+
+from surehold.store.kernels import njit
 
 __all__ = ["SliceSamples", "compiled_for", "slice_sample"]
 

@@ -25,10 +25,10 @@ from math import sqrt
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from surehold.errors import unknown_name
 from surehold.optimization.numerics.exponential import exponential
+from surehold.store.kernels import njit
 
 __all__ = [
     "KERNELS",

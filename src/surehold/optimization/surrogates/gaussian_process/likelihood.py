@@ -21,11 +21,12 @@ from math import exp, inf, log, pi
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numpy.typing import NDArray
 
 from surehold.optimization.numerics.cholesky import cholesky, invert_lower, solve_lower
 from surehold.optimization.surrogates.gaussian_process.kernels import along, correlation_and_factor, self_correlation
+from surehold.store.kernels import njit
 
 __all__ = ["EVIDENCE_TYPE", "Evidence", "log_posterior", "log_posterior_and_gradient"]
 

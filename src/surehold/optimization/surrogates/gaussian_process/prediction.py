@@ -14,7 +14,6 @@ is f(x) itself, so one compiled function serves both.
 """
 
 import numpy as np
-from numba import njit
 
 from surehold.optimization.numerics.cholesky import cholesky, invert_lower, solve_lower, solve_lower_transposed
 from surehold.optimization.surrogates.gaussian_process.kernels import (
@@ -24,6 +23,7 @@ from surehold.optimization.surrogates.gaussian_process.kernels import (
     transposed,
 )
 from surehold.optimization.surrogates.gaussian_process.likelihood import data_covariance
+from surehold.store.kernels import njit
 
 __all__ = ["average", "factorize", "sample"]
 
