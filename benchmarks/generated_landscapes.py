@@ -20,7 +20,7 @@ from scipy.stats import ortho_group, qmc
 
 import surehold as sh
 
-TRAINING, TEST = range(0, 10_000), range(10_000, 20_000)
+TRAINING, TEST = range(10_000), range(10_000, 20_000)
 SHAPES = ("hills", "needles", "cliffs", "ridges", "mixed")
 NOISES = ("isotropic", "anisotropic", "correlated", "uniform", "varying")
 BUDGETS = {1: 40, 2: 60, 3: 80, 4: 100, 5: 120, 6: 130, 7: 140, 8: 150}
@@ -88,7 +88,9 @@ class Landscape:
         bumps = np.prod(mass * width * np.sqrt(2.0 * np.pi) / (2.0 * half), axis=2) @ self.heights
         reach = np.abs(self.normals) @ half  # one axis each
         z = x @ self.normals.T - self.thresholds
-        return bumps - (_STEEP * (_ramp((z + reach) / _STEEP) - _ramp((z - reach) / _STEEP)) / (2 * reach)) @ self.depths
+        return (
+            bumps - (_STEEP * (_ramp((z + reach) / _STEEP) - _ramp((z - reach) / _STEEP)) / (2 * reach)) @ self.depths
+        )
 
     def best(self, net=13, climbs=40):
         """Return the best place by brute force: a net of 2^net points, the bumps' centers, and climbs from the best.

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from surehold.problems.function import Function, load_function, parse_bounds
     from surehold.problems.grasp.problem import Grasp
+    from surehold.problems.named import robust_problem
     from surehold.problems.perturbation import RobustScore, perturbed_points, robust_score
     from surehold.problems.problem import Optimum, Problem
-    from surehold.problems.robust import RobustProblem, robust_problem
+    from surehold.problems.robust import RobustProblem
     from surehold.problems.synthetic import GF, GM, RKHS, GaussianBumps, robust_optimum, synthetic_function
 
 __all__ = [
@@ -42,7 +43,7 @@ _HOMES = {
     "Optimum": "problem",
     "Problem": "problem",
     "RobustProblem": "robust",
-    "robust_problem": "robust",
+    "robust_problem": "named",
     "GF": "synthetic",
     "GM": "synthetic",
     "RKHS": "synthetic",
