@@ -18,7 +18,8 @@ from threadpoolctl import threadpool_limits
 import surehold as sh
 from surehold.campaigns.peers import installed_peers
 from surehold.optimization.strategy import goal
-from surehold.problems.robust import ROBUST, RobustProblem, robust_problem
+from surehold.problems.named import robust_problem
+from surehold.problems.robust import ROBUST, RobustProblem
 
 THESIS = ("rkhs 0.01", "rkhs 0.02", "gm 0.1", "gm 0.05", "gm 0.02", "gm 0.01")
 BUDGETS = {1: 50, 2: 60, 3: 80, 5: 120, 7: 150}

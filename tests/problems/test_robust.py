@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
+from surehold.problems.named import robust_problem
 from surehold.problems.perturbation import robust_score
-from surehold.problems.robust import ROBUST, robust_problem
+from surehold.problems.robust import ROBUST
 from surehold.problems.synthetic import robust_optimum
 
 

@@ -19,13 +19,14 @@ from surehold.reports.verdict import number
 __all__ = ["ClaimResult", "Comparison", "Row", "claim_results", "comparisons", "final_values", "measures_of", "rows_of"]
 
 #: Measures that are better when they are low.
-LOWER: Final = ("std",)
+LOWER: Final = ("std", "regret")
 _FEW: Final = 20  # common seeds below which a missing difference says little
 LABELS: Final = {
     "best": "best observed value",
     "mean": "mean under input noise",
     "worst": "worst of the re-queries",
     "std": "standard deviation of the re-queries",
+    "regret": "regret under input noise",
 }
 
 
@@ -87,7 +88,10 @@ def measures_of(records: Records) -> tuple[str, ...]:
     exhibit = exhibit_of(records.header["plan"])
     if exhibit is not None:
         return exhibit.measures
-    noisy = any(cell["input_noise"] is not None for cell in records.header["cells"])
+    noises = [cell["input_noise"] for cell in records.header["cells"]]
+    if noises and all(noise == "own" for noise in noises):
+        return ("regret", "mean")
+    noisy = any(noise is not None for noise in noises)
     return ("mean", "worst", "std") if noisy else ("best",)
 
 

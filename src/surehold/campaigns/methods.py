@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from surehold.campaigns.peers import PEERS, REQUIRES, installed_peers
 from surehold.campaigns.plan import Cell
+from surehold.campaigns.problem_setup import robust_problem_of, unit_noise_of
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, root_of
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.strategy.presets import thesis_preset
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
@@ -54,11 +55,15 @@ class Surehold:
     """Our optimizer by the settings of a plan."""
 
     def __init__(
-        self, dimension: int, initial: NDArray[np.float64], seed: int, noise: float | None, settings: Mapping[str, Any]
+        self,
+        dimension: int,
+        initial: NDArray[np.float64],
+        seed: int,
+        input_noise: InputNoise | None,
+        settings: Mapping[str, Any],
     ):
         own = dict(settings)
         box = Box.unit(dimension)
-        input_noise = None if noise is None else InputNoise.unit(noise)
         if own.get("surrogate", "gp") == "tgp":
             own["surrogate"] = _treed(own, box, input_noise, seed)
         options = {name: own.pop(name) for name in ("alpha", "beta") if name in own}
@@ -100,13 +105,17 @@ def build_method(cell: Cell, dimension: int, initial: NDArray[np.float64], seed:
         If a setting has no valid value, or a library is not installed.
     """
     told = cell.as_data()
-    noise = cell.on.input_noise if cell.by.robust else None
+    noise = unit_noise_of(cell.on) if cell.by.robust else None
     if cell.by.optimizer == "surehold":
-        return Surehold(dimension, initial, seed, noise, told["settings"])
+        asked = robust_problem_of(cell.on) if cell.by.robust else None
+        risk = (
+            {} if asked is None or asked.risk == "mean" else {n: getattr(asked, n) for n in ("risk", "alpha", "beta")}
+        )
+        return Surehold(dimension, initial, seed, noise, {**risk, **told["settings"]})
     if cell.by.optimizer not in installed_peers():
         missing = ", ".join(REQUIRES[cell.by.optimizer])
         raise InputError(f"method '{cell.method}' needs {missing}; install them: pip install 'surehold[peers]'.")
-    extra = {} if noise is None else {"noise": noise}
+    extra = {} if noise is None else {"root": _root(noise, dimension), "bounded": noise.bounded}
     return PEERS[cell.by.optimizer](dimension, initial, seed, **extra)
 
 
@@ -118,8 +127,10 @@ def checked_method(cell: Cell) -> None:
     InputError
         That names the method.
     """
+    asked = robust_problem_of(cell.on)
+    d = 2 if asked is None else asked.function.box.dimension
     try:
-        build_method(cell, 2, np.full((1, 2), 0.5), 0)
+        build_method(cell, d, np.full((1, d), 0.5), 0)
     except InputError as error:
         text = str(error)
         raise InputError(text if cell.method in text else f"method '{cell.method}': {text}") from None
@@ -145,6 +156,13 @@ def checked_settings(where: str, optimizer: str, settings: Mapping[str, Any], ro
             raise unknown_name(f"surrogate of {where}", value, SURROGATES)
     if robust and optimizer not in _ROBUST:
         raise InputError(f"{where}: '{optimizer}' cannot be told of input noise; leave `robust` out.")
+
+
+def _root(noise: InputNoise, dimension: int) -> NDArray[np.float64]:
+    """Return the root (d, d) of the covariance of noise that is the same everywhere."""
+    if noise.varies:
+        raise InputError(f"BoTorch is told of input noise that is the same everywhere, not {noise!r}.")
+    return root_of(noise.unit_covariance(Box.unit(dimension)))
 
 
 def _treed(own: dict[str, Any], box: Box, input_noise: InputNoise | None, seed: int) -> TreedGaussianProcess:

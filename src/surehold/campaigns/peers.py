@@ -141,11 +141,12 @@ class ScikitOptimize:
 class BoTorch:
     """BoTorch: SingleTaskGP and LogExpectedImprovement; with the noise known, its input perturbation.
 
-    With `noise` (standard deviation in the unit cube) the model averages over 16 quasi-random perturbations, the
-    criterion is the expected improvement of that average, and the answer the observed input with the best one.
+    With `root` (d, d) of the noise's covariance in the unit cube (`bounded` for uniform noise) the model averages over 16
+    quasi-random perturbations, the criterion is the expected improvement of that average, and the answer the observed
+    input with the best one.
     """
 
-    def __init__(self, dimension: int, initial: Array, seed: int, noise: float | None = None):
+    def __init__(self, dimension: int, initial: Array, seed: int, root: Array | None = None, bounded: bool = False):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # importing it warns
             import torch
@@ -154,11 +155,13 @@ class BoTorch:
         _one_torch_thread()
         torch.manual_seed(seed)
         self._shifts = self._average = None
-        if noise is not None:
+        if root is not None:
+            from scipy.special import ndtr
             from scipy.stats import qmc
 
             normals = qmc.MultivariateNormalQMC(np.zeros(dimension), rng=np.random.default_rng(seed)).random(16)
-            self._shifts = torch.tensor(noise * normals)
+            standard = 3.0**0.5 * (2.0 * ndtr(normals) - 1.0) if bounded else normals
+            self._shifts = torch.tensor(standard @ root.T)
             self._average = ExpectationPosteriorTransform(n_w=len(normals))
         self._told = _Told(initial)
         self._model: tuple[int, Any] | None = None
@@ -244,7 +247,7 @@ class RandomSearch:
         return self._told.best()
 
 
-#: Maker of each peer by name; the keyword `noise` goes to those that can be told of the input noise.
+#: Maker of each peer by name; the keywords `root` and `bounded` go to those that can be told of the input noise.
 PEERS: Final[dict[str, Callable[..., Any]]] = {
     "optuna-gp": Optuna,
     "optuna-tpe": lambda d, initial, seed: Optuna(d, initial, seed, "TPESampler"),

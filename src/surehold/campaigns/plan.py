@@ -9,7 +9,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from surehold.errors import InputError, unknown_name
 
@@ -21,15 +21,16 @@ class ProblemSetup:
     """A problem of a plan, its budget and how answers are scored."""
 
     function: str
-    """"rkhs", "gm", "gf", "gf-stretched", "grasp", `package.module:function` or `path/file.py:function`"""
+    """name of `problems.named`, "grasp", `package.module:function` or `path/file.py:function`"""
     trials: int
     """budget, initial design included"""
     initial: int
     """trials of the initial design, a Latin hypercube"""
     arguments: Mapping[str, Any] = field(default_factory=dict)
     """of a grasp (object, facet, variables, contact, ...); bounds of an own function, `NAME=LOWER:UPPER,...`"""
-    input_noise: float | None = None
-    """standard deviation in unit-cube units, in every variable; None: answers are not scored under noise"""
+    input_noise: float | Literal["own"] | None = None
+    """standard deviation in unit-cube units, in every variable; "own": what a robust problem states, with its risk and
+    its score; None: answers are not scored under noise"""
     requeries: int = 100
     """perturbed re-queries that score an answer"""
     observation_noise: float = 0.0
@@ -120,7 +121,7 @@ class Plan:
                 _whole(f"{name} {where}", getattr(on, name))
             if on.initial > on.trials:
                 raise InputError(f"initial {where} is {on.initial}, but trials is {on.trials}; give at most as many.")
-            if on.input_noise is not None and not 0.0 < on.input_noise < 1.0:
+            if on.input_noise not in (None, "own") and not 0.0 < float(on.input_noise) < 1.0:
                 raise InputError(f"input_noise {where} is {on.input_noise!r}; give a share of the box, such as 0.03.")
             if not 0.0 <= on.observation_noise < float("inf"):
                 raise InputError(f"observation_noise {where} is {on.observation_noise!r}; give 0 or more.")

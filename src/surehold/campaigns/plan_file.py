@@ -7,7 +7,7 @@ null is taken away.
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from surehold.campaigns.methods import METHODS, checked_settings
 from surehold.campaigns.plan import MethodSetup, Plan, ProblemSetup
@@ -111,7 +111,7 @@ def _plan_of(document: dict[str, Any], name: str) -> Plan:
         trials: int
         initial: int
         arguments: dict[str, Any] = {}
-        input_noise: float | None = None
+        input_noise: float | Literal["own"] | None = None
         requeries: int = 100
         observation_noise: float = 0.0
         settings: dict[str, Any] = {}

@@ -8,13 +8,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.campaigns.plan import ProblemSetup
 from surehold.errors import InputError, unknown_name
+from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.problem import Problem, checked_points
 
 if TYPE_CHECKING:
     from surehold.problems.grasp.problem import Grasp
+    from surehold.problems.robust import RobustProblem
 
-__all__ = ["SimoxGrasp", "build_problem", "checked_problem", "noise_of", "observer"]
+__all__ = [
+    "SimoxGrasp",
+    "build_problem",
+    "checked_problem",
+    "noise_of",
+    "observer",
+    "robust_problem_of",
+    "unit_noise_of",
+]
 
 _GRASP: Final = ("object", "facet", "variables", "contact", "quality", "closing", "friction", "hand", "bounds", "fixed")
 
@@ -52,18 +62,20 @@ def checked_problem(label: str, on: ProblemSetup) -> None:
     InputError
         For an unknown function or argument, with the nearest valid name.
     """
-    from surehold.problems.synthetic import SYNTHETIC
+    from surehold.problems.named import NAMES, has_own_noise
 
     own = ":" in on.function
     valid = ("bounds",) if own else _GRASP if on.function == "grasp" else ()
-    if not own and on.function != "grasp" and on.function not in SYNTHETIC:
-        known = [*SYNTHETIC, "grasp", "package.module:function", "path/file.py:function"]
+    if not own and on.function != "grasp" and on.function not in NAMES:
+        known = [*NAMES, "grasp", "package.module:function", "path/file.py:function"]
         raise unknown_name(f"function of problem '{label}'", on.function, known)
     for name in on.arguments:
         if not valid:
             raise InputError(f"problem '{label}' gives {name!r}, but '{on.function}' takes no arguments; leave it out.")
         if name not in valid:
             raise unknown_name(f"argument of problem '{label}'", name, valid)
+    if on.input_noise == "own" and not has_own_noise(on.function):
+        raise InputError(f"problem '{label}': '{on.function}' states no input noise of its own; give a number.")
     if own and "bounds" not in on.arguments:
         raise InputError(f"problem '{label}' has no bounds; give for example arguments: {{bounds: 'dx=-0.05:0.05'}}.")
 
@@ -89,14 +101,53 @@ def build_problem(on: ProblemSetup) -> Problem:
         from surehold.problems.function import Function, load_function, parse_bounds
 
         return Function(load_function(on.function), parse_bounds(str(on.arguments["bounds"])), on.function)
-    from surehold.problems.synthetic import synthetic_function
+    from surehold.problems.named import named_function
 
-    return synthetic_function(on.function)
+    return named_function(on.function)
+
+
+def robust_problem_of(on: ProblemSetup) -> "RobustProblem | None":
+    """Return the robust problem whose own noise and score a plan asks for; None where it does not.
+
+    Raises
+    ------
+    InputError
+        If that problem states no input noise.
+    """
+    if on.input_noise != "own":
+        return None
+    from surehold.problems.named import robust_problem
+
+    problem = robust_problem(on.function)
+    if problem.noise is None:
+        raise InputError(f"'{on.function}' has exact inputs; leave input_noise out.")
+    return problem
 
 
 def noise_of(on: ProblemSetup) -> InputNoise | None:
-    """Return the input noise of a problem."""
-    return None if on.input_noise is None else InputNoise.unit(on.input_noise)
+    """Return the input noise of a problem, in the units of its box."""
+    asked = robust_problem_of(on)
+    if asked is not None:
+        return asked.noise
+    return None if on.input_noise is None else InputNoise.unit(float(on.input_noise))
+
+
+def unit_noise_of(on: ProblemSetup) -> InputNoise | None:
+    """Return the input noise of a problem for the unit cube, in which methods work."""
+    asked = robust_problem_of(on)
+    if asked is None or asked.noise is None:
+        return noise_of(on)
+    noise, box = asked.noise, asked.function.box
+    names = Box.unit(box.dimension).names
+    covariance = noise.unit_covariance(box)
+    deviations = np.sqrt(np.diag(covariance))
+    if noise.varies:
+        return InputNoise.varying(lambda u: noise.unit_covariance(box, box.from_unit(u)))
+    if noise.bounded:
+        return InputNoise.uniform(dict(zip(names, (3.0**0.5 * deviations).tolist(), strict=True)))
+    if np.count_nonzero(covariance - np.diag(np.diag(covariance))):
+        return InputNoise(covariance=covariance)
+    return InputNoise(dict(zip(names, deviations.tolist(), strict=True)))
 
 
 def observer(problem: Problem, on: ProblemSetup, seed: int) -> Callable[[NDArray[np.float64]], tuple[float, float]]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from surehold.campaigns.methods import Method, build_method
 from surehold.campaigns.plan import Cell
-from surehold.campaigns.problem_setup import build_problem, noise_of, observer
+from surehold.campaigns.problem_setup import build_problem, noise_of, observer, robust_problem_of
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.strategy.initial_design import design
 from surehold.problems.perturbation import robust_score
@@ -34,9 +34,10 @@ def run_once(cell: Cell, seed: int) -> dict[str, Any]:
     """Make one run and return its row, JSON-ready; an error becomes the row of a failed run.
 
     Fields of a finished run, traces as changes by iteration: `best` (highest value told), `value` (true value of the
-    answer, where it is another), `mean`, `worst`, `std` (of the answer re-queried under the input noise), `leaves` (of
-    the tree); `first_split` (trials told when the tree first split, or null), `x` (the answer, unit cube),
-    `expectation` (its exact mean under the noise, where that is known), `failed_trials`, `ask_seconds` (CPU, a trial).
+    answer, where it is another), `mean`, `worst`, `std` (of the answer re-queried under the input noise), `regret`
+    (under the own noise of a robust problem), `leaves` (of the tree); `first_split` (trials told when the tree first
+    split, or null), `x` (the answer, unit cube), `expectation` (its exact mean under the noise, where that is known),
+    `failed_trials`, `ask_seconds` (CPU, a trial).
     """
     row: dict[str, Any] = {"problem": cell.problem, "method": cell.method, "seed": seed, "digest": cell.digest}
     started, cpu = perf_counter(), process_time()
@@ -60,6 +61,7 @@ class _Run:
         self.method: Method = build_method(cell, d, initial, seed)
         self.observe = observer(self.problem, cell.on, seed)
         self.noise = noise_of(cell.on)
+        self.asked = robust_problem_of(cell.on)
         self.X: list[NDArray[np.float64]] = []
         self.told: list[float] = []
         self.true: list[float] = []
@@ -67,6 +69,7 @@ class _Run:
         self.leaves: list[float] = []
         self.ask_seconds: list[float] = []
         self._scores: dict[bytes, tuple[float, float, float]] = {}
+        self._regrets: dict[bytes, float] = {}
 
     def finish(self) -> dict[str, Any]:
         for t in range(self.cell.on.trials):
@@ -119,6 +122,16 @@ class _Run:
             self._scores[key] = (score.mean, score.worst, score.std)
         return self._scores[key]
 
+    def _regret(self, u: NDArray[np.float64] | None) -> float:
+        """Return what the answer's outcome under the problem's own noise lacks to the best one."""
+        if u is None or self.asked is None or self.asked.optimum is None:
+            return np.nan
+        key = u.tobytes()
+        if key not in self._regrets:
+            value = self.asked.value(self.problem.box.from_unit(u)[None])[0]
+            self._regrets[key] = self.asked.optimum.value - float(value)
+        return self._regrets[key]
+
     def _value(self, u: NDArray[np.float64] | None) -> float:
         if u is None:
             return np.nan
@@ -143,6 +156,8 @@ class _Run:
             row["value"] = value
         if self.noise is not None:
             row |= {name: changes(scores[:, i]) for i, name in enumerate(_ROBUST)}
+        if self.asked is not None:
+            row["regret"] = changes([self._regret(u) for u in self.answers])
         if self._treed:
             row |= {"leaves": changes(self.leaves), "first_split": split[0] if split else None}
         expectation = getattr(self.problem, "expectation", None)

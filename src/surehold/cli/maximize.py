@@ -42,7 +42,10 @@ OWN = Defaults(60, None, "0.03")
 
 def maximize(
     problem: Annotated[
-        str, typer.Argument(help="rkhs, gm, gf, gf-stretched; or package.module:function or path/file.py:function.")
+        str,
+        typer.Argument(
+            help="rkhs, gm, needle-2, nes-polynomial, ...; package.module:function or path/file.py:function."
+        ),
     ],
     bounds: Annotated[
         str,
@@ -62,9 +65,9 @@ def maximize(
     """Find a maximum that still holds when the input is off."""
     checked_method(method)
     chosen = problem_of(problem, bounds)
-    defaults = DEFAULTS.get(problem, OWN)
+    defaults = defaults_of(problem)
     noise_text = defaults.noise if noise is None else noise
-    input_noise = noise_of(noise_text, method)
+    input_noise = own_noise(problem) if noise_text == "own" else noise_of(noise_text, method)
 
     from surehold.cli.session import Kept, folder_for, run_session
     from surehold.optimization.optimizer import Optimizer
@@ -90,8 +93,35 @@ def maximize(
     )
 
 
+def defaults_of(problem: str) -> Defaults:
+    """Return the defaults of a problem: a robust one has its published budget, and its own noise."""
+    from surehold.problems.named import has_own_noise, robust_problem
+
+    if not has_own_noise(problem):
+        return DEFAULTS.get(problem, OWN)
+    robust = robust_problem(problem)
+    return Defaults(robust.trials or OWN.trials, robust.initial or None, "none" if robust.noise is None else "own")
+
+
+def own_noise(problem: str) -> Any:
+    """Return the input noise that a robust problem states.
+
+    Raises
+    ------
+    InputError
+        If it states none.
+    """
+    from surehold.errors import InputError
+    from surehold.problems.named import has_own_noise, robust_problem
+
+    noise = robust_problem(problem).noise if has_own_noise(problem) else None
+    if noise is None:
+        raise InputError(f"problem '{problem}' states no input noise of its own; give --noise, such as 0.03.")
+    return noise
+
+
 def problem_of(text: str, bounds: str) -> Any:
-    """Return the synthetic function of that name, or the user's own function within its bounds.
+    """Return the function of that name, or the user's own function within its bounds.
 
     Raises
     ------
@@ -100,14 +130,14 @@ def problem_of(text: str, bounds: str) -> Any:
     """
     from surehold.errors import InputError, unknown_name
     from surehold.problems.function import Function, load_function, parse_bounds
-    from surehold.problems.synthetic import SYNTHETIC, synthetic_function
+    from surehold.problems.named import NAMES, named_function
 
     if ":" not in text:
-        if text not in SYNTHETIC:
-            raise unknown_name("problem", text, [*SYNTHETIC, "package.module:function", "path/file.py:function"])
+        if text not in NAMES:
+            raise unknown_name("problem", text, [*NAMES, "package.module:function", "path/file.py:function"])
         if bounds:
             raise InputError(f"problem '{text}' has its own bounds; leave --bounds out.")
-        return synthetic_function(text)
+        return named_function(text)
     if not bounds:
         raise InputError(f"--bounds are missing for {text!r}; give for example --bounds dx=-0.05:0.05,dy=0:1.")
     box = parse_bounds(bounds)

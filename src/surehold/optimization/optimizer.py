@@ -85,9 +85,9 @@ class Optimizer:
     kappa
         Standard deviations added by the "ucb" criteria, and by the bounds of the "worst" risk.
     risk
-        What is asked of the outcome under input noise: "mean" (default), "mean-std", "var", "cvar" or "worst", or a
-        `Risk` with parameters of its own. Any but the mean replaces the criterion by the expected improvement of that
-        measure, or, for "worst", by its upper confidence bound.
+        What is asked of the outcome under input noise: "mean" (default), "mean-std", "mean-variance", "var", "cvar" or
+        "worst", or a `Risk` with parameters of its own. Any but the mean replaces the criterion by the expected
+        improvement of that measure, or, for "worst", by its upper confidence bound.
     noise_while_exploring
         Where the input noise acts. False (default): only when the answer is used; trials reach what is commanded, as in
         a simulator. True: trials stray, too. Those whose reached input is told (`tell(x, y, reached=...)`) are learnt

@@ -1,6 +1,7 @@
 """Score an input by what happens around it: re-query the problem where an imprecise execution would end up."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,12 +39,17 @@ class RobustScore:
 
 
 def perturbed_points(
-    x: ArrayLike, box: Box, noise: InputNoise, n: int = 100, seed: int | np.random.Generator = 0
+    x: ArrayLike,
+    box: Box,
+    noise: InputNoise,
+    n: int = 100,
+    seed: int | np.random.Generator = 0,
+    border: Literal["keep", "extend"] = "keep",
 ) -> NDArray[np.float64]:
     """Draw n inputs x + noise around x (d,) -> (n, d), in the units of the box.
 
-    A coordinate that would leave the box keeps its noise-free value (the thesis' rule). The draw depends on
-    (noise, n, seed) only, so two inputs that are compared are shaken in the same way.
+    A coordinate that would leave the box keeps its noise-free value (the thesis' rule), or with "extend" leaves it.
+    The draw depends on (noise, n, seed) only, so two inputs that are compared are shaken in the same way.
 
     Raises
     ------
@@ -60,6 +66,8 @@ def perturbed_points(
     rng = np.random.default_rng(seed)
     unit = box.to_unit(center[0])
     reached = unit + noise.draws(box, unit, int(n), rng)
+    if border == "extend":
+        return box.lower + reached * box.widths
     outside = (reached < 0.0) | (reached > 1.0)
     return np.where(outside, center[0], box.from_unit(np.clip(reached, 0.0, 1.0)))
 
@@ -69,14 +77,16 @@ def robust_score(
 ) -> RobustScore:
     """Query `problem` at n perturbations of x (d,) and return mean, standard deviation and worst outcome.
 
-    A re-query that raises an exception or gives no finite number is counted in `n_failed` and left out.
+    A re-query that raises an exception or gives no finite number is counted in `n_failed` and left out. Inputs leave
+    the box only if the problem says so (`problem.border == "extend"`), see `perturbed_points`.
 
     Raises
     ------
     InputError
         If n is not a positive integer, x lies outside the box, or the noise does not fit the box.
     """
-    points = perturbed_points(x, problem.box, noise, n, seed)
+    border = "extend" if getattr(problem, "border", "keep") == "extend" else "keep"
+    points = perturbed_points(x, problem.box, noise, n, seed, border)
     outcomes = np.array([_outcome(problem, point) for point in points])
     values = outcomes[np.isfinite(outcomes)]
     n_failed = int(outcomes.size - values.size)

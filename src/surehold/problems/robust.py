@@ -1,29 +1,85 @@
-"""Problems on which the highest peak is not the answer: sums of Gaussian bumps under input noise, with known optima.
+"""Robust problems: a function, the noise under which its best place is sought, and what is asked of the outcome.
 
-Each is a function and the noise for which it is meant. A needle is a bump that the noise levels; a hill is one that it
-leaves. Units are those of the unit cube.
+Here are those on which the highest peak is not the answer: sums of Gaussian bumps under input noise, with known
+optima. A needle is a bump that the noise levels; a hill is one that it leaves. Units are those of the unit cube.
 """
 
-from typing import Final, NamedTuple
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import unknown_name
+from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.problems.problem import Optimum
 from surehold.problems.synthetic import GaussianBumps
 
-__all__ = ["ROBUST", "RobustProblem", "robust_problem"]
+__all__ = ["ROBUST", "RobustProblem"]
 
 
 class RobustProblem(NamedTuple):
-    """A function and the input noise under which its best place is sought."""
+    """A function, the noise under which its best place is sought, and what is asked of the outcome."""
 
-    function: GaussianBumps
-    noise: InputNoise
-    observation_noise: float = 0.0
-    """standard deviation of what is added to every trial"""
+    function: Any
+    """a `problems.Problem` with `expectation(x, noise)` and `standard_deviation(x, noise)`"""
+    noise: InputNoise | None
+    """None where inputs are exact and only observations are noisy"""
+    observation_noise: float | Callable[[NDArray[np.float64]], NDArray[np.float64]] = 0.0
+    """standard deviation of what is added to every trial; where it varies, a function of points (n, d)"""
+    risk: str = "mean"
+    """what is asked of the outcome: a name of `Risk`"""
+    alpha: float = 0.1
+    """of that risk: the share of worst outcomes"""
+    beta: float = 1.0
+    """of that risk: standard deviations or variances off the mean"""
+    initial: int = 0
+    """trials of the published initial design; 0 where none is published"""
+    trials: int = 0
+    """published budget, initial design included; 0 where none is published"""
+    optimum: Optimum | None = None
+    """best place and its `value`, where they are known to the digits given"""
+
+    def value(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what is asked of the outcome at x (n, d), exactly or to about 1e-3 of the spread (risk "var").
+
+        Without input noise the outcome's spread is that of the observations.
+
+        Raises
+        ------
+        InputError
+            For a risk that has no closed form or quadrature here.
+        """
+        points = np.atleast_2d(x)
+        if self.noise is None:
+            mean, std = self.function(points), self.observed_std(points)
+        else:
+            mean = self.function.expectation(points, self.noise)
+            std = self.function.standard_deviation(points, self.noise) if self.risk.startswith("mean-") else 0.0
+        if self.risk == "mean":
+            return mean
+        if self.risk in ("mean-std", "mean-variance"):
+            return mean - self.beta * (std if self.risk == "mean-std" else np.square(std))
+        if self.risk == "var" and self.noise is not None:
+            return np.array([_quantile(self.function, point, self.noise, self.alpha) for point in points])
+        raise InputError(f"risk '{self.risk}' has no value here; give mean, mean-std, mean-variance or var.")
+
+    def observed_std(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the standard deviation of the observation noise (n,) at x (n, d)."""
+        points = np.atleast_2d(x)
+        noise = self.observation_noise
+        return noise(points) if callable(noise) else np.full(len(points), float(noise))
+
+
+def _quantile(function: Any, point: NDArray[np.float64], noise: InputNoise, alpha: float) -> float:
+    """Return the alpha-quantile of the outcome at a point (d,), by 2^14 quasi-random inputs."""
+    from scipy.stats import qmc
+
+    box: Box = function.box
+    normals = qmc.MultivariateNormalQMC(np.zeros(box.dimension), rng=np.random.default_rng(0)).random(2**14)
+    root = noise.unit_roots(box, box.to_unit(point)[None])[0]
+    return float(np.quantile(function(point + (normals @ root.T) * box.widths), alpha))
 
 
 def _along(angle: float, long: float, short: float) -> NDArray[np.float64]:
@@ -86,7 +142,7 @@ def _many() -> RobustProblem:
 
 
 #: The problems by name.
-ROBUST: Final = {
+ROBUST: Final[dict[str, Callable[[], RobustProblem]]] = {
     **{f"needle-{d}": (lambda d=d: _needle(d)) for d in (2, 3, 5, 7)},
     "needle-2-noisy": lambda: _needle(2)._replace(observation_noise=0.03),
     "ridge": _ridge,
@@ -94,16 +150,3 @@ ROBUST: Final = {
     "corner": lambda: _border("corner", [1.0, 1.0]),
     "many": _many,
 }
-
-
-def robust_problem(name: str) -> RobustProblem:
-    """Return the problem of that name: needle-2 (-3, -5, -7, -2-noisy), ridge, edge, corner or many.
-
-    Raises
-    ------
-    InputError
-        If the name is not one of these.
-    """
-    if name not in ROBUST:
-        raise unknown_name("robust problem", name, ROBUST)
-    return ROBUST[name]()

@@ -27,7 +27,7 @@ from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.border import Moments, moments_at_border
 from surehold.problems.problem import Optimum, checked_points
 
-__all__ = ["GF", "GM", "RKHS", "SYNTHETIC", "GaussianBumps", "robust_optimum", "synthetic_function"]
+__all__ = ["GF", "GM", "RKHS", "SYNTHETIC", "GaussianBumps", "highest", "robust_optimum", "synthetic_function"]
 
 
 class GaussianBumps:
@@ -47,11 +47,14 @@ class GaussianBumps:
         (k, d, d) C_k, each symmetric positive definite.
     optimum
         The point (d,) of the highest value in the box, where it is known.
+    border
+        What an input that leaves the box is worth: "keep" gives the coordinate its noise-free value, "extend" goes on
+        with the formula.
 
     Raises
     ------
     InputError
-        If shapes do not fit or a covariance is not positive definite.
+        If shapes do not fit, a covariance is not positive definite or the border rule is unknown.
     """
 
     def __init__(
@@ -62,9 +65,13 @@ class GaussianBumps:
         centers: ArrayLike,
         covariances: ArrayLike,
         optimum: ArrayLike | None = None,
+        border: str = "keep",
     ):
+        if border not in ("keep", "extend"):
+            raise unknown_name("border rule", border, ("keep", "extend"))
         self.name: Final[str] = name
         self.box: Final[Box] = box
+        self.border: Final[str] = border
         self.heights: Final = np.array(heights, dtype=np.float64)
         self.centers: Final = np.array(centers, dtype=np.float64)
         self.covariances: Final = np.array(covariances, dtype=np.float64)
@@ -84,7 +91,7 @@ class GaussianBumps:
     def optimum(self) -> Optimum:
         """The highest value in the box and where it is; searched for when it was not given."""
         if self._optimum is None:
-            self._optimum = _highest(self, self.box, self.centers).x
+            self._optimum = highest(self, self.box, self.centers).x
         return Optimum(self._optimum.copy(), float(self(self._optimum)))
 
     def __call__(self, x: ArrayLike) -> float | NDArray[np.float64]:
@@ -96,14 +103,17 @@ class GaussianBumps:
     def expectation(self, x: ArrayLike, noise: InputNoise) -> float | NDArray[np.float64]:
         """Return E f(x + xi), xi ~ `noise`, at x (d,) or (n, d), to about 1e-9."""
         points, single = checked_points(x, self.box)
-        values = moments_at_border(self, points, self.box, noise, self._moments(points, noise))[0]
+        values = self._at_border(points, noise, self._moments(points, noise))[0]
         return float(values[0]) if single else values
 
     def standard_deviation(self, x: ArrayLike, noise: InputNoise) -> float | NDArray[np.float64]:
         """Return the standard deviation of f(x + xi), xi ~ `noise`, at x (d,) or (n, d), to about 1e-9."""
         points, single = checked_points(x, self.box)
-        values = moments_at_border(self, points, self.box, noise, self._moments(points, noise, second=True))[1]
+        values = self._at_border(points, noise, self._moments(points, noise, second=True))[1]
         return float(values[0]) if single else values
+
+    def _at_border(self, points: NDArray[np.float64], noise: InputNoise, extended: Moments) -> Moments:
+        return extended if self.border == "extend" else moments_at_border(self, points, self.box, noise, extended)
 
     def _moments(self, points: NDArray[np.float64], noise: InputNoise, second: bool = False) -> Moments:
         """Return E f and the standard deviation (NaN unless asked for) with the function extended beyond the box."""
@@ -263,10 +273,11 @@ def robust_optimum(problem: GaussianBumps | GF, noise: InputNoise) -> Optimum:
     accurate to about 1e-6 of the box in x.
     """
     starts = problem.centers if isinstance(problem, GaussianBumps) else np.empty((0, problem.box.dimension))
-    return _highest(lambda x: problem.expectation(x, noise), problem.box, starts)
+    return highest(lambda x: problem.expectation(x, noise), problem.box, starts)
 
 
-def _highest(f: Callable[[NDArray[np.float64]], object], box: Box, starts: NDArray[np.float64]) -> Optimum:
+def highest(f: Callable[[NDArray[np.float64]], object], box: Box, starts: NDArray[np.float64]) -> Optimum:
+    """Return the highest value of f((n, d)) in the box and where it is: a net and `starts`, then climbs."""
     from scipy.optimize import minimize
     from scipy.stats import qmc
 

@@ -49,7 +49,8 @@ def problem_of(settings: StudySettings, function: str = "") -> Callable[[Any], A
     InputError
         If there is neither, or it cannot be loaded.
     """
-    from surehold.problems import load_function, synthetic_function
+    from surehold.problems import load_function
+    from surehold.problems.named import named_function
 
     if function:
         return load_function(function)
@@ -57,7 +58,7 @@ def problem_of(settings: StudySettings, function: str = "") -> Callable[[Any], A
     if "function" in described:
         return load_function(described["function"])
     if "synthetic" in described:
-        return synthetic_function(described["synthetic"])
+        return named_function(described["synthetic"])
     if "grasp" in described:
         return _grasp(described["grasp"], "thesis" if settings.optimizer.get("preset") == "thesis" else "")
     raise InputError(

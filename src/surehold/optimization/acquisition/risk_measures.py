@@ -5,7 +5,8 @@ Legend
     weights   w_i of the perturbations, (s,), positive, summing to 1
     rho       risk measure of one draw, larger is better; its distribution over draws is what the model knows of it
     alpha     share of the worst outcomes that counts, in (0, 1)
-    beta      standard deviations taken off the mean, or added to and taken off the model's mean in the worst case
+    beta      standard deviations or variances taken off the mean; in the worst case standard deviations added to and
+              taken off the model's mean
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from surehold.optimization.surrogates.protocol import Posterior
 
 __all__ = ["RISKS", "Risk", "RiskImprovement", "WorstCaseBound"]
 
-RISKS: Final = ("mean", "mean-std", "var", "cvar", "worst")
+RISKS: Final = ("mean", "mean-std", "mean-variance", "var", "cvar", "worst")
 _DRAWS: Final = 16  # joint draws a particle; common random numbers make the criterion a smooth function of the query
 
 
@@ -29,9 +30,9 @@ _DRAWS: Final = 16  # joint draws a particle; common random numbers make the cri
 class Risk:
     """A risk measure of the outcome under input noise.
 
-    "mean": the expected outcome. "mean-std": mean - beta standard deviations. "var": value at risk, the outcome that a
-    share alpha of executions falls below. "cvar": the mean of that share (Rockafellar and Uryasev 2000). "worst": the
-    lowest outcome among the perturbations (after Bogunovic et al. 2018).
+    "mean": the expected outcome. "mean-std": mean - beta standard deviations. "mean-variance": mean - beta variances.
+    "var": value at risk, the outcome that a share alpha of executions falls below. "cvar": the mean of that share
+    (Rockafellar and Uryasev 2000). "worst": the lowest outcome among the perturbations (after Bogunovic et al. 2018).
     """
 
     name: str = "mean"
@@ -44,7 +45,9 @@ class Risk:
         if not 0.0 < self.alpha < 1.0:
             raise InputError(f"alpha is {self.alpha!r}; give the share of worst outcomes, strictly between 0 and 1.")
         if not (np.isfinite(self.beta) and self.beta >= 0.0):
-            raise InputError(f"beta is {self.beta!r}; give a finite number of standard deviations, 0 or more.")
+            raise InputError(
+                f"beta is {self.beta!r}; give a finite number of standard deviations or variances, 0 or more."
+            )
 
     def measure(self, draws: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return rho (...) of draws (..., s)."""
@@ -53,8 +56,9 @@ class Risk:
         mean = draws @ weights
         if self.name == "mean":
             return mean
-        if self.name == "mean-std":
-            return mean - self.beta * np.sqrt(np.maximum(np.square(draws - mean[..., None]) @ weights, 0.0))
+        if self.name in ("mean-std", "mean-variance"):
+            variance = np.maximum(np.square(draws - mean[..., None]) @ weights, 0.0)
+            return mean - self.beta * (variance if self.name == "mean-variance" else np.sqrt(variance))
         order = np.argsort(draws, axis=-1)
         ordered = np.take_along_axis(draws, order, axis=-1)
         reached = np.cumsum(weights[order], axis=-1)

@@ -1,0 +1,177 @@
+"""Robust regret on a family of landscapes drawn by seed: `python -m benchmarks.generated_family --count 20`.
+
+    python -m benchmarks.generated_family --count 60 --methods default tgp plain --classes ridges anisotropic
+    python -m benchmarks.generated_family --set test --count 200 --out family.csv
+
+One to eight variables; hills, needles, cliffs, ridges; isotropic, anisotropic (some inputs exact), correlated, uniform
+and varying noise: see `benchmarks.generated_landscapes`. Constants are chosen on the training set only; the test set
+is for the one judgment at the end. Every method gets the same initial design, problem by problem. Regret is what the
+answer's outcome under the noise lacks to the best one, in per cent of the best minus the mean over the box; within 1 %
+counts as found. Printed are, at half and full budget, the share found and the mean regret with standard errors over
+problems, the paired difference of the final regret from the first method, and CPU seconds a run; for all problems, and
+by shape, noise and number of variables.
+"""
+
+import argparse
+import csv
+import sys
+import time
+
+import numpy as np
+from joblib import Parallel, delayed
+from scipy.stats import qmc
+from threadpoolctl import threadpool_limits
+
+import surehold as sh
+from benchmarks.generated_landscapes import BUDGETS, NOISES, SHAPES, TEST, TRAINING, landscape
+from surehold.campaigns.peers import installed_peers
+
+OURS = {
+    "default": {},
+    "tgp": {"surrogate": "tgp"},
+    "uei-thesis": {"criterion": "uei", "preset": "thesis"},
+    "plain": None,
+    "local-global": {"surrogate": "local_global"},
+}
+GROUPS = {"1-2 variables": (1, 2), "3-4 variables": (3, 4), "5-6 variables": (5, 6), "7-8 variables": (7, 8)}
+
+
+def run(seed, run_seed, method, budget_share=1.0):
+    """Return a row: the problem's kind, and regrets [%] at half and full budget."""
+    problem = landscape(seed)
+    d = problem.dimension
+    budget = max(int(budget_share * BUDGETS[d]), 10)
+    n_initial = min(sh.Optimizer.default_n_initial(problem.box), budget // 2)
+    initial = qmc.LatinHypercube(d, rng=np.random.default_rng([seed, run_seed, 98])).random(n_initial)
+    started = time.process_time()
+    with threadpool_limits(1):
+        answers = _answers(problem, method, initial, budget, run_seed)
+    seconds = time.process_time() - started
+    best = problem.best()
+    half, full = 100.0 * (best.value - problem.expectation(np.array(answers))) / best.scale
+    return {
+        "seed": seed,
+        "run": run_seed,
+        "method": method,
+        "d": d,
+        "shape": problem.shape,
+        "noise": problem.kind,
+        "half": float(half),
+        "full": float(full),
+        "seconds": seconds,
+    }
+
+
+def _answers(problem, method, initial, budget, seed):
+    """Return the answers after half and all of the trials."""
+    waiting, answers, X, y = list(initial), [], [], []
+    if method in OURS:
+        settings = OURS[method]
+        noise = {} if settings is None else {"input_noise": problem.noise}
+        optimizer = sh.Optimizer(problem.box, n_initial=len(initial), seed=seed, **noise, **(settings or {}))
+        observed = settings is None
+    else:
+        optimizer, waiting, observed = installed_peers()[method](problem.dimension, initial, seed), [], True
+    for i in range(budget):
+        u = np.clip(waiting.pop(0) if waiting else optimizer.ask(), 0.0, 1.0)
+        X.append(u)
+        y.append(problem(u))
+        optimizer.tell(u, y[-1])
+        if i + 1 in (budget // 2, budget):
+            answers.append(X[int(np.argmax(y))] if observed else optimizer.recommend().x)
+    return answers
+
+
+def summary(rows, reference=None):
+    """Return one line of text about rows of one method; `reference` are those of the first on the same runs."""
+    parts = []
+    for name in ("half", "full"):
+        regret = np.array([row[name] for row in rows])
+        found = regret <= 1.0
+        root = np.sqrt(len(rows))
+        parts.append(
+            f"{100 * found.mean():5.0f} ({100 * found.std() / root:4.1f}) "
+            f"{regret.mean():7.2f} ({regret.std(ddof=1) / root if len(rows) > 1 else np.nan:5.2f})"
+        )
+    paired = ""
+    if reference is not None and len(rows) > 1:
+        gap = np.array([row["full"] for row in rows]) - np.array([row["full"] for row in reference])
+        paired = f"{gap.mean():+7.2f} ({gap.std(ddof=1) / np.sqrt(len(gap)):5.2f})"
+    return f"{len(rows):4d}  {parts[0]}  {parts[1]}  {paired:16} {np.mean([row['seconds'] for row in rows]):6.1f}"
+
+
+def classes_of(rows):
+    """Return {class: rows}, all first."""
+    found = {"all": rows}
+    found |= {shape: [row for row in rows if row["shape"] == shape] for shape in SHAPES}
+    found |= {noise: [row for row in rows if row["noise"] == noise] for noise in NOISES}
+    found |= {name: [row for row in rows if row["d"] in group] for name, group in GROUPS.items()}
+    return {name: members for name, members in found.items() if members}
+
+
+def chosen_seeds(family, first, count, classes):
+    """Return seeds of a set, of problems whose shape, noise and group are among the classes (any where none is)."""
+    seeds, wanted = [], set(classes)
+    for seed in family[first:]:
+        if len(seeds) == count:
+            break
+        problem = landscape(seed)
+        group = next(name for name, members in GROUPS.items() if problem.dimension in members)
+        named = [wanted & set(kinds) for kinds in (SHAPES, NOISES, GROUPS)]
+        mine = (problem.shape, problem.kind, group)
+        if all(not names or own in names for names, own in zip(named, mine, strict=True)):
+            seeds.append(seed)
+    return seeds
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--set", choices=("training", "test"), default="training")
+    parser.add_argument("--first", type=int, default=0, help="number of the first problem in the set")
+    parser.add_argument("--count", type=int, default=20, help="problems")
+    parser.add_argument("--runs", type=int, default=1, help="runs a problem")
+    parser.add_argument("--classes", nargs="+", default=[], choices=(*SHAPES, *NOISES, *GROUPS))
+    parser.add_argument("--methods", nargs="+", default=list(OURS), choices=(*OURS, *installed_peers()))
+    parser.add_argument("--budget", type=float, default=1.0, help="share of the usual number of trials")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--out", default="", help="file for the rows, as CSV")
+    arguments = parser.parse_args()
+    family = {"training": TRAINING, "test": TEST}[arguments.set]
+    seeds = chosen_seeds(family, arguments.first, arguments.count, arguments.classes)
+    tasks = [(s, r, m) for s in seeds for r in range(arguments.runs) for m in arguments.methods]
+    rows = []
+    jobs = (delayed(run)(*task, arguments.budget) for task in tasks)
+    try:
+        for row in Parallel(n_jobs=arguments.processes, return_as="generator")(jobs):
+            rows.append(row)
+            told = f"{row['shape']}, {row['noise']}, d = {row['d']}"
+            print(
+                f"[{len(rows)}/{len(tasks)}] {row['seed']} {told}, {row['method']}: {row['half']:.2f} % at half, "
+                f"{row['full']:.2f} % at the end, {row['seconds']:.0f} s",
+                file=sys.stderr,
+                flush=True,
+            )
+    except KeyboardInterrupt:
+        print(f"interrupted after {len(rows)} of {len(tasks)} runs", file=sys.stderr)
+    if arguments.out and rows:
+        with open(arguments.out, "w", newline="") as file:
+            writer = csv.DictWriter(file, rows[0])
+            writer.writeheader()
+            writer.writerows(rows)
+    print(f"{arguments.set} set, {len(seeds)} problems, {arguments.runs} run(s) each; regret in % of best - mean")
+    print(
+        f"{'class':14} {'method':14}    n  {'half: found %':>12} {'regret %':>15}  {'full: found %':>12} "
+        f"{'regret %':>15}  {'- first':16} {'CPU s':>6}"
+    )
+    for name, members in classes_of(rows).items():
+        by_method = {m: [row for row in members if row["method"] == m] for m in arguments.methods}
+        reference = {(row["seed"], row["run"]): row for row in by_method[arguments.methods[0]]}
+        for method, own in by_method.items():
+            same = [reference.get((row["seed"], row["run"])) for row in own]
+            comparable = method != arguments.methods[0] and own and all(same)
+            if own:
+                print(f"{name:14} {method:14} {summary(own, same if comparable else None)}")
+
+
+if __name__ == "__main__":
+    main()
