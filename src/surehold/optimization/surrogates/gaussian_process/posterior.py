@@ -201,10 +201,16 @@ class GaussianProcessPosterior:
         """
         v = self.hyperparameters.v[:, None]  # (m, 1)
         if self.log_noise is None:
-            return np.broadcast_to(self.outputs.square * (self.evidence.noise.mean() + v), (len(v), len(X)))
+            return self.outputs.square * (self._known_noise(X) + v)
         level = self.log_noise.moments(X)
         quantiles = ndtri((np.arange(len(v)) + 0.5) / len(v))[:, None]
         return self.outputs.square * (np.exp(level.mean[0] + quantiles * np.sqrt(level.variance[0])) + v)
+
+    def _known_noise(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance (q,) at X (q, d), standardized, without what the particles have learnt."""
+        if self.log_noise is not None:
+            return np.exp(self.log_noise.moments(X).mean[0])
+        return np.full(len(X), self.evidence.noise.mean())
 
 
 def surprise(inverse_L: NDArray[np.float64], Y: NDArray[np.float64], k: int) -> float:
