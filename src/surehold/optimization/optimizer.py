@@ -283,7 +283,7 @@ class Optimizer:
         candidates = self._goal.candidates(
             self._posterior(),
             self._trials.reached[told],
-            self._trials.values[told],
+            self._trials.modelled[told],
             pending,
             self._trials.reached[~told],
             rng,
@@ -336,6 +336,8 @@ class Optimizer:
                 observed,
                 (tried[highest], float(values[highest])),
                 len(values),
+                tuple(np.flatnonzero(self._trials.outliers).tolist()),
+                self._known_noise**2 if self._straying else None,  # what is learnt from then contains the input noise
             )
 
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -359,7 +361,7 @@ class Optimizer:
         with single_threaded():
             posterior = self._posterior()
             return self._goal.promise(
-                posterior, self._trials.reached[told], self._trials.values[told], self._rng(4, len(self._trials))
+                posterior, self._trials.reached[told], self._trials.modelled[told], self._rng(4, len(self._trials))
             )
 
     def estimate_input_noise(self) -> InputNoise:

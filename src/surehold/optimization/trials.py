@@ -11,9 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 
-__all__ = ["Trials", "same"]
+__all__ = ["OUTLIER_DISTANCE", "Trials", "same"]
 
 _SEPARATION: Final = 1e-6  # points closer than this in every coordinate of the unit cube are the same trial
+
+#: Ranges of all other values by which an outlier lies below them.
+OUTLIER_DISTANCE: Final = 5.0
 
 
 def same(u: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -66,10 +69,27 @@ class Trials:
         return np.array(self._pending).reshape(-1, self._box.dimension)
 
     @property
-    def modelled(self) -> NDArray[np.float64]:
-        """Values with failed trials counted as the lowest value told so far, (t,); needs one value at least."""
+    def outliers(self) -> NDArray[np.bool_]:
+        """Whether each value lies so far below the others that it is no measurement of the response, (t,).
+
+        Such as a reading of -30 among values from 0 to 1, or a penalty of -1000 for a crash: it, and all that is lower,
+        lies below the others by more than `OUTLIER_DISTANCE` times their whole range. A third of the values or more
+        are no outliers, and where the others are all equal nothing can be said.
+        """
         values = self.values
-        return np.where(self.successful, values, values[self.successful].min())
+        told = np.sort(values[self.successful])
+        n = len(told)
+        unit = told / max(float(np.abs(told).max()), 1e-300) if n else told  # differences of the largest overflow
+        gap, above = np.diff(unit), (unit[-1:] - unit)[1:]
+        apart = np.flatnonzero((gap > OUTLIER_DISTANCE * above) & (above > 0.0) & (3 * np.arange(1, n) < n))
+        return values < told[apart[-1] + 1] if len(apart) else np.zeros(len(values), dtype=bool)
+
+    @property
+    def modelled(self) -> NDArray[np.float64]:
+        """Values with failed trials and outliers counted as the lowest other value, (t,); needs one value at least."""
+        values = self.values
+        sound = self.successful & ~self.outliers
+        return np.where(sound, values, values[sound].min())
 
     def ask(self, u: NDArray[np.float64]) -> None:
         """Record that a trial at u (d,) is under way."""

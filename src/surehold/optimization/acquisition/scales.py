@@ -193,7 +193,7 @@ def where_to_look(
     )  # (c, s + 1, d)
     both = posterior.average(np.tile(u, (len(points), 1)), together, weights).variance
     covariance = 0.5 * (both - variance_g - variance_f)  # (m, c)
-    total = variance_f + posterior.noise_variance(points)
+    total = variance_f + posterior.noise_variance(points).mean(axis=0)
     share = np.divide(covariance, np.sqrt(total), out=np.zeros_like(total), where=total > 0.0)
     gain = np.mean(share**2, axis=0)
     gain[0] *= _AT_THE_PLACE

@@ -269,8 +269,8 @@ class LocalGlobalPosterior:
         return LocalGlobalPosterior(together, particles, self._outputs, self.diagnostics.evaluations)
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the variance of the observation noise (q,): 0, for observations are exact."""
-        return np.zeros(len(X))
+        """Return the variance of the observation noise (m, q): 0, for observations are exact."""
+        return np.zeros((len(self._particles), len(X)))
 
 
 class LocalGlobalProcess:

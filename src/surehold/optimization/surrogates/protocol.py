@@ -122,7 +122,10 @@ class Posterior(Protocol):
         ...
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the variance of the observation noise (q,) at X (q, d), known or learnt, in squared outputs."""
+        """Return the variance of the observation noise (m, q) at X (q, d), in squared outputs.
+
+        Known, or learnt: then particles differ, and their spread is what is not known of the noise.
+        """
         ...
 
 

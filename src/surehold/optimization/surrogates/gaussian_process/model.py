@@ -318,7 +318,7 @@ class GaussianProcess:
         Of known standard deviations of single observations the quadratic mean is taken.
         """
         queries, _ = checked_data(X, None, self.posterior.evidence.X.shape[1])
-        return np.sqrt(self.posterior.noise_variance(queries))
+        return np.sqrt(self.posterior.noise_variance(queries).mean(axis=0))
 
 
 def checked_data(

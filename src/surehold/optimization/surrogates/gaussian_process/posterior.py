@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from surehold.errors import SureholdError
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
@@ -193,8 +194,17 @@ class GaussianProcessPosterior:
         return GaussianProcessPosterior(extended, theta, self.outputs, self.diagnostics.evaluations, Y, self.log_noise)
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the variance of the observation noise (q,) at X (q, d), known or learnt, in squared outputs."""
-        return self.outputs.square * (self._known_noise(X) + self.hyperparameters.v.mean())
+        """Return the variance of the observation noise (m, q) at X (q, d), known or learnt, in squared outputs.
+
+        Of noise that differs from place to place each particle takes another quantile of what is known of its
+        logarithm.
+        """
+        v = self.hyperparameters.v[:, None]  # (m, 1)
+        if self.log_noise is None:
+            return self.outputs.square * (self._known_noise(X) + v)
+        level = self.log_noise.moments(X)
+        quantiles = ndtri((np.arange(len(v)) + 0.5) / len(v))[:, None]
+        return self.outputs.square * (np.exp(level.mean[0] + quantiles * np.sqrt(level.variance[0])) + v)
 
     def _known_noise(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance (q,) at X (q, d), standardized, without what the particles have learnt."""

@@ -281,7 +281,7 @@ class TreedGaussianProcess:
     def noise_std(self, X: ArrayLike) -> NDArray[np.float64]:
         """Return the standard deviation of the observation noise (q,) at X (q, d): what is known of it, or learnt."""
         queries, _ = checked_data(X, None, self.posterior.regions.lower.shape[1])
-        return np.sqrt(self.posterior.noise_variance(queries))
+        return np.sqrt(self.posterior.noise_variance(queries).mean(axis=0))
 
 
 def least_leaf_width(deviations: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -100,11 +100,11 @@ class TreedPosterior:
         return TreedPosterior(self.partition, tuple(leaves), self.diagnostics.observations)
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the variance of the observation noise (q,) at X (q, d), known or learnt, in squared outputs."""
+        """Return the variance of the observation noise (m, q) at X (q, d), known or learnt, in squared outputs."""
         home = self.partition.route(X)
-        variance = np.empty(len(X))
+        variance = np.empty((len(self.leaves[0].hyperparameters.theta), len(X)))
         for leaf in np.unique(home):
-            variance[home == leaf] = self.leaves[leaf].noise_variance(X[home == leaf])
+            variance[:, home == leaf] = self.leaves[leaf].noise_variance(X[home == leaf])
         return variance
 
     def _pieces(self, points: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.intp], int, NDArray[np.intp]]]:
@@ -167,5 +167,5 @@ class AveragedTrees:
         return AveragedTrees(tuple(tree.with_pending(X) for tree in self.trees))
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the variance of the observation noise (q,) at X (q, d), known or learnt, in squared outputs."""
-        return np.mean([tree.noise_variance(X) for tree in self.trees], axis=0)
+        """Return the variance of the observation noise (m, q) at X (q, d), known or learnt, in squared outputs."""
+        return np.concatenate([tree.noise_variance(X) for tree in self.trees])

@@ -1,0 +1,58 @@
+"""What is stated of the answer: of one execution, and of the mean of many."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import surehold as sh
+
+LINE = sh.Box({"x": (-1.0, 1.0)})
+
+
+def test_one_execution_contains_the_observation_noise_and_the_mean_does_not():
+    rng = np.random.default_rng(5)
+    optimizer = sh.Optimizer(LINE, noise="inferred", seed=5)
+    optimizer.restore(rng.uniform(-1.0, 1.0, (200, 1)), rng.normal(42.0, 0.45, 200))
+    best = optimizer.recommend()
+    executions = stats.norm(42.0, 0.45)
+    assert executions.cdf(best.quantile) == pytest.approx(0.05, abs=0.02)
+    assert best.probability_below(41.5) == pytest.approx(executions.cdf(41.5), abs=0.04)
+    assert best.std == pytest.approx(0.45, rel=0.1)
+    assert best.expectation.std < 0.15
+    assert best.expectation.quantile(0.005) < 42.0 < best.expectation.quantile(0.995)
+
+
+def test_known_noise_widens_one_execution_by_its_variance():
+    exact, noisy = (sh.Optimizer(LINE, noise=level, seed=1) for level in (1e-9, 0.3))
+    X = np.linspace(-1.0, 1.0, 12)[:, None]
+    for optimizer in (exact, noisy):
+        optimizer.restore(X, np.cos(2.0 * X[:, 0]))
+    best = noisy.recommend()
+    assert best.std**2 == pytest.approx(best.expectation.std**2 + 0.3**2, rel=1e-6)
+    assert exact.recommend().std < 1e-3
+
+
+def test_under_input_noise_one_execution_strays_and_the_mean_does_not():
+    noise = sh.InputNoise({"x": 0.1})
+    optimizer = sh.Optimizer(LINE, input_noise=noise, seed=2)
+    X = np.linspace(-1.0, 1.0, 25)[:, None]
+    optimizer.restore(X, np.sin(3.0 * X[:, 0]))
+    best = optimizer.recommend()
+    reached = best.x[0] + 0.1 * np.random.default_rng(0).standard_normal(20_000)
+    values = np.sin(3.0 * reached)
+    assert best.mean == pytest.approx(values.mean(), abs=2e-3)
+    assert best.std == pytest.approx(values.std(), rel=0.05)
+    assert best.expectation.mean == pytest.approx(best.mean, abs=1e-6)
+    assert best.expectation.std < 0.1 * best.std
+
+
+def test_straying_trials_do_not_count_the_input_noise_twice():
+    noise = sh.InputNoise({"x": 0.05})
+    rng = np.random.default_rng(3)
+    optimizer = sh.Optimizer(LINE, input_noise=noise, noise_while_exploring=True, seed=3)
+    X = rng.uniform(-1.0, 1.0, (60, 1))
+    optimizer.restore(X, np.sin(6.0 * (X[:, 0] + 0.05 * rng.standard_normal(60))))
+    best = optimizer.recommend()
+    values = np.sin(6.0 * (best.x[0] + 0.05 * np.random.default_rng(0).standard_normal(20_000)))
+    twice = float(np.sqrt(2.0) * values.std())
+    assert best.std < max(twice, 0.15)
