@@ -337,7 +337,7 @@ class Optimizer:
                 (tried[highest], float(values[highest])),
                 len(values),
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
-                self._known_noise**2 if self._straying else None,  # what is learnt from then contains the input noise
+                self._execution_noise(),
             )
 
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -410,6 +410,14 @@ class Optimizer:
             posterior = LatticePosterior(posterior, self._lattice)
         self._cache = (t, posterior)
         return posterior
+
+    def _execution_noise(self) -> float | None:
+        """Return the variance of the observation noise of one execution; None is what the surrogate says.
+
+        What the surrogate learns from trials that strayed contains the input noise, which executions have anyway.
+        """
+        known = getattr(self._surrogate, "known_noise", None) if self._straying else None
+        return None if known is None else known**2
 
     def _snapped(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         return U if self._lattice is None else self._lattice.snap(U)
