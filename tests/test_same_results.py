@@ -57,7 +57,9 @@ def test_grasps_have_the_same_quality_and_joints():
     now = dict(same_results.grasps(each=3))
     assert now.keys() == stored["grasps"].keys()
     for name, before in stored["grasps"].items():
-        np.testing.assert_allclose(now[name], before, rtol=1e-9, atol=1e-9, err_msg=name)
+        # The quality "simox" (4) is relative to forces at every triangle, which releases of manifold3d cut differently.
+        tolerance = 1e-3 if name.split()[2] == "4" else 1e-9
+        np.testing.assert_allclose(now[name], before, rtol=tolerance, atol=1e-9, err_msg=name)
 
 
 def _record() -> None:
