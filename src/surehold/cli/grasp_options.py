@@ -57,7 +57,7 @@ def object_of(name: str, unit: str, mass: float | None, frame: str | None, conso
     InputError
         If the file is refused, or options of a mesh are given for a shipped object.
     """
-    from surehold.grasping.object.model import OBJECTS, shipped_object
+    from surehold.grasping.object.shipped import OBJECTS, shipped_object
 
     if name in OBJECTS or not (Path(name).suffix or Path(name).exists()):
         options = {"--unit": unit or None, "--mass": mass, "--frame": frame}

@@ -52,7 +52,7 @@ def scene(
     from surehold.cli.compilation import announced
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
-    from surehold.grasping.object.model import OBJECTS
+    from surehold.grasping.object.shipped import OBJECTS
     from surehold.problems.grasp.default_poses import default_facet
     from surehold.problems.grasp.problem import Grasp
     from surehold.reports import files, gather

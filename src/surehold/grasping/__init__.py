@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from surehold.grasping.hand.model import Hand, Preshape
     from surehold.grasping.hand.named import HANDS, hand_named
     from surehold.grasping.object.distance_field import DistanceField, distance_field_of
-    from surehold.grasping.object.model import OBJECTS, GraspObject, shipped_object
+    from surehold.grasping.object.model import GraspObject
+    from surehold.grasping.object.shipped import OBJECTS, shipped_object
     from surehold.grasping.physics.check import GraspCheck, GraspChecker
     from surehold.grasping.pictures.scene import Scene, SceneMesh, grasp_scene
     from surehold.grasping.pose_noise import PoseNoise, RobustQuality, robust_quality
@@ -41,7 +42,7 @@ _HOMES = {
     "HANDS": "hand.named",
     "Hand": "hand.model",
     "MODES": "poses",
-    "OBJECTS": "object.model",
+    "OBJECTS": "object.shipped",
     "ObjectWrenchSpace": "wrench.simox",
     "Pose": "poses",
     "PoseNoise": "pose_noise",
@@ -69,7 +70,7 @@ _HOMES = {
     "object_wrench_space": "wrench.simox",
     "read_isaac_grasps": "formats",
     "robust_quality": "pose_noise",
-    "shipped_object": "object.model",
+    "shipped_object": "object.shipped",
     "simox_quality": "wrench.simox",
     "soft_finger_torsion": "wrench.friction_cones",
     "task_quality": "wrench.force_closure",

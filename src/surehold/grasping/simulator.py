@@ -24,7 +24,8 @@ from surehold.grasping.hand.model import CLOSED, Hand, link_ends, link_frames
 from surehold.grasping.hand.named import hand_named
 from surehold.grasping.hand.synergy import ClosingMotion, closing_motion, preshape_of
 from surehold.grasping.object.distance_field import MARGIN, DistanceField, distance_field_of
-from surehold.grasping.object.model import GraspObject, shipped_object
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.poses import Pose
 from surehold.grasping.wrench.quality import Measure
 from surehold.grasping.wrench.wrench_space import WrenchQuality

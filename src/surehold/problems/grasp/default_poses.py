@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from surehold.grasping.hand.synergy import closing_motion, preshape_of
 from surehold.grasping.object.distance_field import cache_folder, content_hash
-from surehold.grasping.object.model import OBJECTS, GraspObject
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.shipped import OBJECTS
 from surehold.grasping.poses import MODES, Pose, default_pose, facet_axes
 from surehold.grasping.simulator import Simulator
 

@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.hand.model import Hand
 from surehold.grasping.hand.synergy import preshape_of
-from surehold.grasping.object.model import GraspObject, shipped_object
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.poses import Pose, default_pose, facet_axes
 from surehold.grasping.simulator import THESIS, Simulator
 from surehold.grasping.simulator import Grasp as GraspOutcome
