@@ -4,7 +4,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
-from surehold.grasping import OBJECTS, STATUSES, Pose, Simulator, default_pose, wrench_quality
+from surehold.grasping import OBJECTS, STATUSES, Pose, Simulator, default_pose, grasp_scene, wrench_quality
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def test_scene_holds_watertight_bodies_in_the_world(simulator):
     motion = Pose((0.3, -0.2, 0.1), tuple(Rotation.from_euler("xyz", [0.4, 0.2, -0.9]).as_quat(scalar_first=True)))
     there = Simulator(obj="mug", object_pose=motion)
     grasp = there.grasp(motion @ pose_of(there), -0.7)
-    scene, opened = there.scene(grasp), there.scene(grasp, opened=True)
+    scene, opened = grasp_scene(there, grasp), grasp_scene(there, grasp, opened=True)
     assert len(scene.hand) == 21
     for body in (scene.object, *scene.hand, *opened.hand):
         assert body.vertices.dtype == np.float32

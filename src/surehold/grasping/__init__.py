@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from surehold.grasping.batch import GraspBatch, grasp_batch
-    from surehold.grasping.closing.closing import CLOSING_MODES
-    from surehold.grasping.closing.contacts import CONTACT_MODELS, Contacts
+    from surehold.grasping.choices import CLOSING_MODES, COLLISIONS, CONTACT_MODELS, QUALITIES
+    from surehold.grasping.closing.contacts import Contacts
     from surehold.grasping.formats import GraspFile, StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
+    from surehold.grasping.grasp import STATUSES, Grasp
     from surehold.grasping.hand.icub import icub_left_hand, icub_right_hand
     from surehold.grasping.hand.model import Hand, Preshape
     from surehold.grasping.hand.named import HANDS, hand_named
@@ -18,22 +19,21 @@ if TYPE_CHECKING:
     from surehold.grasping.pictures.scene import Scene, SceneMesh, grasp_scene
     from surehold.grasping.pose_noise import PoseNoise, RobustQuality, robust_quality
     from surehold.grasping.poses import FACETS, MODES, Pose, default_pose
-    from surehold.grasping.simulator import COLLISIONS, STATUSES, Grasp, Simulator
+    from surehold.grasping.simulator import Simulator
     from surehold.grasping.wrench.force_closure import force_closure, gravity_wrenches, task_quality
     from surehold.grasping.wrench.friction_cones import contact_wrenches, soft_finger_torsion
     from surehold.grasping.wrench.hull.inscribed_ball import ball_radius
-    from surehold.grasping.wrench.quality import QUALITIES
     from surehold.grasping.wrench.simox import ObjectWrenchSpace, object_wrench_space, simox_quality
     from surehold.grasping.wrench.wrench_space import WrenchQuality, wrench_quality
 
 _HOMES = {
-    "CLOSING_MODES": "closing.closing",
-    "COLLISIONS": "simulator",
-    "CONTACT_MODELS": "closing.contacts",
+    "CLOSING_MODES": "choices",
+    "COLLISIONS": "choices",
+    "CONTACT_MODELS": "choices",
     "Contacts": "closing.contacts",
     "DistanceField": "object.distance_field",
     "FACETS": "poses",
-    "Grasp": "simulator",
+    "Grasp": "grasp",
     "GraspBatch": "batch",
     "GraspCheck": "physics.check",
     "GraspChecker": "physics.check",
@@ -47,9 +47,9 @@ _HOMES = {
     "Pose": "poses",
     "PoseNoise": "pose_noise",
     "Preshape": "hand.model",
-    "QUALITIES": "wrench.quality",
+    "QUALITIES": "choices",
     "RobustQuality": "pose_noise",
-    "STATUSES": "simulator",
+    "STATUSES": "grasp",
     "Scene": "pictures.scene",
     "SceneMesh": "pictures.scene",
     "Simulator": "simulator",

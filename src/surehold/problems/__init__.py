@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from surehold.problems.function import Function, load_function, parse_bounds
-    from surehold.problems.grasp.problem import Grasp
+    from surehold.problems.grasp.problem import GraspProblem as Grasp
     from surehold.problems.perturbation import RobustScore, perturbed_points, robust_score
     from surehold.problems.problem import Optimum, Problem
     from surehold.problems.robust import RobustProblem, robust_problem
@@ -35,7 +35,7 @@ _HOMES = {
     "Function": "function",
     "load_function": "function",
     "parse_bounds": "function",
-    "Grasp": "grasp.problem",
+    "Grasp": "grasp.problem:GraspProblem",
     "RobustScore": "perturbation",
     "perturbed_points": "perturbation",
     "robust_score": "perturbation",
@@ -55,7 +55,8 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    home, _, own_name = _HOMES[name].partition(":")
+    value = getattr(import_module(f"{__name__}.{home}"), own_name or name)
     globals()[name] = value
     return value
 

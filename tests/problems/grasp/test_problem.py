@@ -5,8 +5,9 @@ import pytest
 
 from surehold.errors import InputError
 from surehold.grasping import MODES, Simulator, default_pose, shipped_object
+from surehold.problems import Grasp
 from surehold.problems.grasp.default_poses import GraspDefault, grasp_default, search_default
-from surehold.problems.grasp.problem import VARIABLES, Grasp
+from surehold.problems.grasp.options import VARIABLES
 from surehold.problems.problem import Problem
 
 

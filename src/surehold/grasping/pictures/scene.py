@@ -5,10 +5,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.grasping.hand.model import Hand, link_frames
+from surehold.grasping.grasp import Grasp
+from surehold.grasping.hand.kinematics import link_frames
+from surehold.grasping.hand.model import Hand
 from surehold.grasping.hand.synergy import closing_motion
 from surehold.grasping.poses import Pose
-from surehold.grasping.simulator import Grasp, Simulator
+from surehold.grasping.simulator import Simulator
 
 __all__ = ["Scene", "SceneMesh", "grasp_scene"]
 
