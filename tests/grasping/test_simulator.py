@@ -1,3 +1,5 @@
+import sys
+
 import numpy as np
 import pytest
 import trimesh
@@ -156,3 +158,14 @@ def test_poses_that_are_not_finite_are_refused(simulator):
         simulator.grasp(Pose((float("nan"), 0.0, 0.0)))
     with pytest.raises(InputError, match="finite"):
         simulator.grasp(Pose(), float("inf"))
+
+
+def test_a_trial_calls_few_python_functions_of_its_own(simulator):
+    """A trial takes about a millisecond: 182 calls for the names of 91 contacts, as before, would be a tenth of it."""
+    pose, calls = pose_of(simulator), []
+    simulator.grasp(pose, -0.7)
+    sys.setprofile(lambda frame, event, _: calls.append(frame.f_code.co_filename) if event == "call" else None)
+    simulator.grasp(pose, -0.7)
+    sys.setprofile(None)
+    own = [name for name in calls if "surehold" in name]
+    assert 10 < len(own) < 100, len(own)

@@ -9,7 +9,7 @@ from surehold.grasping.hand.model import Hand
 from surehold.grasping.hand.named import hand_named
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.shipped import OBJECTS, shipped_object
-from surehold.problems.grasp.options import GraspOptions, checked_words
+from surehold.problems.grasp.options import OPTIONS, THESIS_SIMULATOR, GraspOptions, checked_words
 from surehold.problems.grasp.problem import GraspProblem
 
 __all__ = ["described_grasp", "described_hand", "described_object"]
@@ -28,7 +28,9 @@ def described_grasp(
     given = checked_words(words)
     body = obj or described_object(given["object"], given["unit"], given["mass"], given["frame"])[0]
     hand = described_hand(given["hand"], given["hand_config"])
-    options: GraspOptions = {name: given[name] for name in GraspOptions.__annotations__}  # type: ignore[assignment]
+    # A command line says every option: what has its default does not contradict a preset.
+    unsaid = {name for name in THESIS_SIMULATOR if given[name] == OPTIONS[name].default}
+    options = {name: given[name] for name in GraspOptions.__annotations__ if name not in unsaid}
     return GraspProblem(body, given["facet"], given["variables"], **{**options, "hand": hand}, progress=progress)
 
 

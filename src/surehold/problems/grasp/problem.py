@@ -107,7 +107,7 @@ class GraspProblem:
         if preset not in OPTIONS["preset"].choices:
             raise unknown_name("preset", preset, ["thesis"])
         for name, value in THESIS_SIMULATOR.items() if preset else ():
-            if given[name] not in (value, OPTIONS[name].default):
+            if options.get(name, value) != value:
                 raise InputError(
                     f"preset '{preset}' sets {name} to {value!r}, but {given[name]!r} is given; leave one of them out."
                 )
