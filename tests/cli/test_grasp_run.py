@@ -29,27 +29,8 @@ def test_no_grasp_is_closed_twice(here, monkeypatch):
 
 
 def test_the_preset_of_the_thesis_grasps_as_the_thesis(here):
-    assert (
-        run(
-            [
-                "grasp",
-                "bottle",
-                "--preset",
-                "thesis-grasp",
-                "--trials",
-                "3",
-                "--initial",
-                "3",
-                "--noise",
-                "none",
-                "--method",
-                "bo",
-                "--out",
-                "b",
-            ]
-        )
-        == 0
-    )
+    line = "grasp bottle --preset thesis-grasp --trials 3 --initial 3 --noise none --method bo --out b"
+    assert run(line.split()) == 0
     settings = json.loads((here / "b" / "result.json").read_text())["settings"]
     assert (settings["contact"], settings["quality"], settings["closing"]) == ("single", "simox", "synergy")
     assert settings["preset"] == "thesis-grasp"

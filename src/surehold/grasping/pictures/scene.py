@@ -29,11 +29,6 @@ class SceneMesh:
     faces: NDArray[np.int32] = field(repr=False)  #: (f, 3), counterclockwise seen from outside
     poses: NDArray[np.float32] = field(repr=False)  #: (k, 3, 4) body's frame in the world while the hand closes
 
-    @property
-    def placed(self) -> NDArray[np.float32]:
-        """Vertices (v, 3) in the world at the end [m]."""
-        return self.vertices @ self.poses[-1, :, :3].T + self.poses[-1, :, 3]
-
 
 @dataclass(frozen=True, eq=False)
 class Scene:

@@ -30,8 +30,8 @@ def described_grasp(
     hand = described_hand(given["hand"], given["hand_config"])
     # A command line says every option: what has its default does not contradict a preset.
     unsaid = {name for name in THESIS_SIMULATOR if given[name] == OPTIONS[name].default}
-    options = {name: given[name] for name in GraspOptions.__annotations__ if name not in unsaid}
-    return GraspProblem(body, given["facet"], given["variables"], **{**options, "hand": hand}, progress=progress)
+    options: Any = {name: given[name] for name in GraspOptions.__annotations__ if name not in unsaid}
+    return GraspProblem(body, given["facet"], given["variables"], **(options | {"hand": hand}), progress=progress)
 
 
 def described_object(name: str, unit: str, mass: float | None, frame: str | None) -> tuple[GraspObject, str]:
