@@ -82,7 +82,9 @@ def studies() -> None:
     assert callable(Dashboard(study, lambda study: {}).application())
     with listening(0) as server:
         Thread(target=server.run, args=(service(study, token),), daemon=True).start()
-        request = urllib.request.Request(f"{server.address}/studies/arm/status", headers={"Authorization": f"Bearer {token}"})
+        request = urllib.request.Request(
+            f"{server.address}/studies/arm/status", headers={"Authorization": f"Bearer {token}"}
+        )
         with urllib.request.urlopen(request, timeout=30) as answer:
             assert json.load(answer)["state"] == "open"
 

@@ -15,7 +15,7 @@ from scipy.stats import spearmanr
 from surehold.grasping import OBJECTS
 from surehold.grasping.physics.check import GraspChecker
 from surehold.optimization.numerics.threads import single_threaded
-from surehold.problems.grasp.problem import Grasp
+from surehold.problems import Grasp
 
 DRAWN, CHECKED, BINS = 1500, 60, 5
 

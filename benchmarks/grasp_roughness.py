@@ -13,7 +13,7 @@ import numpy as np
 
 from surehold.grasping import CONTACT_MODELS, OBJECTS
 from surehold.optimization.numerics.threads import single_threaded
-from surehold.problems.grasp.problem import Grasp
+from surehold.problems import Grasp
 
 STEP = 0.000125
 LINES = (-0.4, 0.0, 0.4)

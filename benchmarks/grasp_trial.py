@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from surehold.grasping import CONTACT_MODELS, OBJECTS, STATUSES
 from surehold.optimization.numerics.threads import single_threaded
-from surehold.problems.grasp.problem import Grasp
+from surehold.problems import Grasp
 
 TRIALS = 400
 

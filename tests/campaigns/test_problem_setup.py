@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from surehold.campaigns.plan import ProblemSetup
-from surehold.campaigns.problem_setup import SimoxGrasp, build_problem, noise_of, observer
+from surehold.campaigns.problem_setup import build_problem, noise_of, observer
 from surehold.grasping.wrench.simox import object_wrench_space, simox_quality
-from surehold.problems.grasp.problem import Grasp
+from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.synthetic import GM
 
 
@@ -24,14 +24,14 @@ def test_a_grasp_takes_its_arguments():
     problem = build_problem(ProblemSetup("grasp", 8, 5, {"object": "glass", "variables": ["dx", "s1"]}))
     assert problem.box.names == ("dx", "s1")
     x = problem.box.from_unit([0.3, 0.5])
-    assert problem(x) == Grasp("glass", variables=("dx", "s1"))(x)
+    assert problem(x) == GraspProblem("glass", variables=("dx", "s1"))(x)
 
 
 def test_the_simulators_measure_is_that_of_the_contacts():
     arguments = {"object": "bottle", "contact": "single", "closing": "synergy", "quality": "simox"}
     problem = build_problem(ProblemSetup("grasp", 8, 5, arguments))
-    assert isinstance(problem, SimoxGrasp)
-    plain = Grasp("bottle", contact="single", closing="synergy")
+    assert isinstance(problem, GraspProblem)
+    plain = GraspProblem("bottle", contact="single", closing="synergy")
     space = object_wrench_space(plain.object.vertices, plain.object.faces)
     points = problem.box.from_unit(np.random.default_rng(0).random((40, 2)))
     values = problem(points)

@@ -6,7 +6,8 @@ import coal
 import numpy as np
 from exact_mesh import ExactMesh, capsule_pair
 
-from surehold.grasping.hand.model import CLOSED, link_ends
+from surehold.grasping.hand.kinematics import link_ends
+from surehold.grasping.hand.model import CLOSED
 from surehold.grasping.hand.synergy import closing_motion
 
 _TOUCH = 1e-5  # m
@@ -20,7 +21,7 @@ class ExactClosing:
         fingers, joints = self.hand.radii.shape
         links = [(f, k) for f in range(fingers) for k in range(joints) if self.hand.radii[f, k] > 0.0]
         self.pairs = [(link, None) for link in links]
-        self.pairs += [(link, "palm") for link in links if link[1] >= 2]
+        self.pairs += [(link, "palm") for link in links]
         self.pairs += [(a, b) for a in links for b in links if a[0] < b[0]]
 
     def joints(self, pose, s1):

@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
 from surehold.grasping.hand.icub import icub_left_hand
-from surehold.grasping.object.model import shipped_object
+from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.poses import FACETS, MODES, Pose, default_pose, facet_axes
 
 NORMALS = dict(

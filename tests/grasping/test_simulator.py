@@ -1,10 +1,12 @@
+import sys
+
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
-from surehold.grasping import OBJECTS, STATUSES, Pose, Simulator, default_pose, wrench_quality
+from surehold.grasping import OBJECTS, STATUSES, Pose, Simulator, default_pose, grasp_scene, wrench_quality
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +106,7 @@ def test_scene_holds_watertight_bodies_in_the_world(simulator):
     motion = Pose((0.3, -0.2, 0.1), tuple(Rotation.from_euler("xyz", [0.4, 0.2, -0.9]).as_quat(scalar_first=True)))
     there = Simulator(obj="mug", object_pose=motion)
     grasp = there.grasp(motion @ pose_of(there), -0.7)
-    scene, opened = there.scene(grasp), there.scene(grasp, opened=True)
+    scene, opened = grasp_scene(there, grasp), grasp_scene(there, grasp, opened=True)
     assert len(scene.hand) == 21
     for body in (scene.object, *scene.hand, *opened.hand):
         assert body.vertices.dtype == np.float32
@@ -156,3 +158,14 @@ def test_poses_that_are_not_finite_are_refused(simulator):
         simulator.grasp(Pose((float("nan"), 0.0, 0.0)))
     with pytest.raises(InputError, match="finite"):
         simulator.grasp(Pose(), float("inf"))
+
+
+def test_a_trial_calls_few_python_functions_of_its_own(simulator):
+    """A trial takes about a millisecond: 182 calls for the names of 91 contacts, as before, would be a tenth of it."""
+    pose, calls = pose_of(simulator), []
+    simulator.grasp(pose, -0.7)
+    sys.setprofile(lambda frame, event, _: calls.append(frame.f_code.co_filename) if event == "call" else None)
+    simulator.grasp(pose, -0.7)
+    sys.setprofile(None)
+    own = [name for name in calls if "surehold" in name]
+    assert 10 < len(own) < 100, len(own)

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from surehold.campaigns.plan import ProblemSetup
 from surehold.campaigns.plan_file import load_plan
-from surehold.campaigns.problem_setup import SimoxGrasp, build_problem
+from surehold.campaigns.problem_setup import build_problem
+from surehold.grasping.pictures.scene import grasp_scene
 from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.protocol import Posterior, mixture
+from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.synthetic import synthetic_function
 from surehold.reports import gather
 from surehold.reports.campaign_report import Band, Line, Panel, Picture, Points
@@ -167,22 +169,22 @@ def grasp_scenes(answers: dict[str, tuple[list[float], list[float]]] | None = No
     scenes = {}
     for obj in ("bottle", "mug", "glass", "drill"):
         problem = _grasp_of(problems[obj])
-        center = problem.base.box.from_unit(np.full(problem.box.dimension, 0.5))
+        center = problem.box.from_unit(np.full(problem.box.dimension, 0.5))
         figure = "4.2, 4.3" if obj == "glass" else "4.2"
-        opened = problem.base.simulator.scene(problem.base.grasp(center), opened=True)
+        opened = grasp_scene(problem.simulator, problem.grasp(center), opened=True)
         scenes[f"Figure {figure}: {obj}"] = gather.grasp_scene(opened)
     problem = _grasp_of(problems["bottle"])
     for label, (u, shaken) in (answers or {}).items():
         for word, place in (("", u), (", worst re-query", shaken)):
             x = problem.box.from_unit(np.array(place))
             name = f"Figure 4.16: {label}{word}, {float(np.asarray(problem(x))):.3f}"
-            scenes[name] = gather.grasp_scene(problem.base.simulator.scene(problem.base.grasp(x)))
+            scenes[name] = gather.grasp_scene(grasp_scene(problem.simulator, problem.grasp(x)))
     return scenes
 
 
-def _grasp_of(on: ProblemSetup) -> SimoxGrasp:
+def _grasp_of(on: ProblemSetup) -> GraspProblem:
     problem = build_problem(on)
-    assert isinstance(problem, SimoxGrasp)
+    assert isinstance(problem, GraspProblem)
     return problem
 
 

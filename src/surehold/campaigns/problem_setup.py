@@ -1,57 +1,21 @@
 """From a plan's words to the problem itself: synthetic functions, grasps, functions of one's own."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from surehold.campaigns.plan import ProblemSetup
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.problems.problem import Problem, checked_points
+from surehold.problems.problem import Problem
 
 if TYPE_CHECKING:
-    from surehold.problems.grasp.problem import Grasp
     from surehold.problems.robust import RobustProblem
 
-__all__ = [
-    "SimoxGrasp",
-    "build_problem",
-    "checked_problem",
-    "noise_of",
-    "observer",
-    "robust_problem_of",
-    "unit_noise_of",
-]
-
-_GRASP: Final = ("object", "facet", "variables", "contact", "quality", "closing", "friction", "hand", "bounds", "fixed")
-
-
-class SimoxGrasp:
-    """A grasp measured as the thesis' simulator does, so that levels can be compared; see `grasping.simox`.
-
-    Contacts count whether or not the grasp is force closure; 0 for an initial collision and for fewer than two.
-    """
-
-    def __init__(self, grasp: "Grasp"):
-        from surehold.grasping.wrench.simox import object_wrench_space
-
-        self.name: Final = grasp.name
-        self.box: Final = grasp.box
-        self.base: Final = grasp
-        """measures by its own quality, and gives the whole outcome"""
-        self._space = object_wrench_space(grasp.object.vertices, grasp.object.faces)
-
-    def __call__(self, x: ArrayLike) -> float | NDArray[np.float64]:
-        """Return the quality at x (d,) as a float, or the qualities at x (n, d) as an array (n,)."""
-        from surehold.grasping.wrench.simox import simox_quality
-
-        points, single = checked_points(x, self.box)
-        contacts = [self.base.grasp(point).contacts for point in points]
-        values = [simox_quality(c.points, c.normals, self._space) if len(c) >= 2 else 0.0 for c in contacts]
-        return values[0] if single else np.array(values)
+__all__ = ["build_problem", "checked_problem", "noise_of", "observer", "robust_problem_of", "unit_noise_of"]
 
 
 def checked_problem(label: str, on: ProblemSetup) -> None:
@@ -62,10 +26,11 @@ def checked_problem(label: str, on: ProblemSetup) -> None:
     InputError
         For an unknown function or argument, with the nearest valid name.
     """
+    from surehold.problems.grasp.options import OPTIONS
     from surehold.problems.named import NAMES, has_own_noise
 
     own = ":" in on.function
-    valid = ("bounds",) if own else _GRASP if on.function == "grasp" else ()
+    valid = ("bounds",) if own else OPTIONS if on.function == "grasp" else ()
     if not own and on.function != "grasp" and on.function not in NAMES:
         known = [*NAMES, "grasp", "package.module:function", "path/file.py:function"]
         raise unknown_name(f"function of problem '{label}'", on.function, known)
@@ -89,14 +54,11 @@ def build_problem(on: ProblemSetup) -> Problem:
         If an argument has no valid value, or an own function cannot be loaded.
     """
     if on.function == "grasp":
-        from surehold.problems.grasp.problem import Grasp
+        from surehold.problems.grasp.description import described_grasp
 
-        arguments: dict[str, Any] = dict(on.arguments)
-        simox = arguments.get("quality") == "simox"
-        if simox:
-            del arguments["quality"]
-        grasp = Grasp(arguments.pop("object", "mug"), **arguments)
-        return SimoxGrasp(grasp) if simox else grasp
+        # The published measure is 0 for a collision: plans that ask for it say nothing else of collisions.
+        worth = {"collision": "zero"} if on.arguments.get("quality") == "simox" else {}
+        return described_grasp({**worth, **on.arguments})
     if ":" in on.function:
         from surehold.problems.function import Function, load_function, parse_bounds
 

@@ -10,20 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from surehold.cli.grasp_options import (
-    Closing,
-    Friction,
-    HandConfigFile,
-    HandName,
-    MeshFrame,
-    MeshMass,
-    MeshUnit,
-    ObjectName,
-    PreshapeName,
-    hand_of,
-    object_of,
-    shown_progress,
-)
+from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.options import (
     Initial,
     Method,
@@ -38,31 +25,51 @@ from surehold.cli.options import (
     checked_method,
     noise_of,
 )
+from surehold.errors import unknown_name
 
-__all__ = ["grasp"]
+__all__ = ["Outcomes", "grasp"]
+
+_PRESETS = ("thesis", "thesis-grasp")  # both with the simulator of the thesis
 
 
+class Outcomes:
+    """A grasp problem that keeps what came of every trial: the report and the files close no hand again."""
+
+    def __init__(self, problem: Any):
+        self.problem, self.name, self.box, self.warm_up = problem, problem.name, problem.box, problem.warm_up
+        self._kept: dict[bytes, Any] = {}
+
+    def grasp(self, x: Any) -> Any:
+        """Return the outcome of the trial at x (d,)."""
+        key = np.asarray(x, dtype=np.float64).tobytes()
+        if key not in self._kept:
+            self._kept[key] = self.problem.grasp(x)
+        return self._kept[key]
+
+    def __call__(self, x: Any) -> float:
+        """Return the quality at x (d,)."""
+        return self.grasp(x).quality
+
+
+def simulator_preset(preset: str) -> str:
+    """Return the preset of the simulator that belongs to one of the optimizer.
+
+    Raises
+    ------
+    InputError
+        If the thesis has that preset for another problem than grasps, or it is unknown.
+    """
+    if preset and preset not in _PRESETS:
+        raise unknown_name("preset of a grasp", preset, _PRESETS)
+    return "thesis" if preset else ""
+
+
+@takes_grasp_options
 def grasp(
-    obj: ObjectName,
-    facet: Annotated[
+    obj: Annotated[
         str,
-        typer.Option(
-            help="The facet that the palm faces, then the one at the thumb; by default right-front, of the drill "
-            "bottom-front.",
-            show_default=False,
-        ),
-    ] = "",
-    variables: Annotated[str, typer.Option(help="Free variables, of dx,dy,dz,rx,ry,rz,s1.")] = "dx,dy",
-    contact: Annotated[str, typer.Option(help="single, patch or graded (soft touch).")] = "graded",
-    quality: Annotated[str, typer.Option(help="epsilon, signed_epsilon, volume, simox, task or closure.")] = "epsilon",
-    unit: MeshUnit = "",
-    mass: MeshMass = None,
-    frame: MeshFrame = None,
-    friction: Friction = None,
-    hand: HandName = "icub-left",
-    hand_config: HandConfigFile = "",
-    preshape: PreshapeName = "",
-    closing: Closing = "adaptive",
+        typer.Argument(metavar="OBJECT", help="mug, bottle, glass, drill, or a mesh file (STL, OBJ, PLY, glTF, GLB)."),
+    ],
     method: Method = "ubo",
     trials: Trials = 100,
     initial: Initial = 40,
@@ -74,6 +81,7 @@ def grasp(
     storage: StudyStorage = "",
     check: Annotated[bool, typer.Option("--check", help="Shake the grasps found, by physics (MuJoCo).")] = False,
     open_report: Open = False,
+    **options: Any,
 ) -> None:
     """Find a grasp that still holds when the hand is off."""
     checked_method(method)
@@ -83,45 +91,20 @@ def grasp(
     from surehold.cli.session import Kept, folder_for, run_session
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
-    from surehold.problems.grasp.problem import Grasp
+    from surehold.grasping.pictures.scene import grasp_scene
+    from surehold.problems.grasp.description import described_grasp
     from surehold.reports import gather
     from surehold.reports.run_report import Candidate, RunReport
     from surehold.reports.still import still_picture
     from surehold.store.atomic import write_file
 
-    names = tuple(name.strip() for name in variables.split(",") if name.strip())
-    described = {
-        "object": obj,
-        "facet": facet,
-        "variables": list(names),
-        "contact": contact,
-        "quality": quality,
-        "unit": unit,
-        "mass": mass,
-        "frame": frame,
-        "friction": friction,
-        "hand": hand,
-        "hand config": hand_config,
-        "preshape": preshape,
-        "closing": closing,
-    }
+    names = [name.strip() for name in options["variables"].split(",") if name.strip()]
+    described = {"object": obj, **options, "variables": names, "preset": simulator_preset(preset)}
     kept = Kept(study, storage, {"grasp": described})
     console = terminal()
-    body, gripper = object_of(obj, unit, mass, frame, console), hand_of(hand, hand_config)
+    body = object_of(described, console)
     with announced(console), shown_progress("default pose", console) as progress:
-        problem = Grasp(
-            body,
-            facet,
-            names,
-            contact=contact,
-            quality=quality,
-            closing=closing,
-            friction=friction,
-            hand=gripper,
-            preshape=preshape or None,
-            preset="thesis" if preset == "thesis" else "",
-            progress=progress,
-        )
+        problem = described_grasp(described, body, progress)
     described["facet"] = problem.facet
     checker = None
     if check:
@@ -130,8 +113,10 @@ def grasp(
         checker = GraspChecker(problem.simulator)  # before the run: without MuJoCo it says so at once
     folder = folder_for(f"{problem.object.name} {problem.facet}", method, seed, out, study)
 
+    outcomes = Outcomes(problem)
+
     def describe(candidate: Candidate) -> Candidate:
-        outcome = problem.grasp(candidate.x)
+        outcome = outcomes.grasp(candidate.x)
         position = ", ".join(f"{1000 * p:.1f}" for p in outcome.pose.position)
         turn = ", ".join(f"{q:.3f}" for q in outcome.pose.quaternion)
         physics = {} if checker is None else {"physics": checked(checker.check(outcome), console)}
@@ -142,20 +127,20 @@ def grasp(
             details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
             | physics,
             scene=replace(
-                gather.grasp_scene(problem.simulator.scene(outcome)), neighbors=neighbors_of(problem, candidate)
+                gather.grasp_scene(grasp_scene(problem.simulator, outcome)), neighbors=neighbors_of(problem, candidate)
             ),
         )
 
     def also_write(report: RunReport, folder: Path) -> None:
-        write_grasps(problem, report, folder / "grasps.yaml")
-        every = {c.label: {"x": c.x, "grasp": problem.grasp(c.x)} for c in report.candidates}
+        write_grasps(outcomes, report, folder / "grasps.yaml")
+        every = {c.label: {"x": c.x, "grasp": outcomes.grasp(c.x)} for c in report.candidates}
         text = json.dumps(grasp_to_dict(every), indent=1, allow_nan=False)
         write_file(folder / "grasps.json", text + "\n")
         if report.recommended.scene is not None:
             write_file(folder / "grasp.png", still_picture(report.recommended.scene)[0])
 
     run_session(
-        problem,
+        outcomes,
         title=f"Grasp the {problem.object.name} from the {problem.facet}",
         method=method,
         noise=input_noise,
@@ -213,17 +198,19 @@ def checked(outcome: Any, console: Any) -> str:
     return text
 
 
-def write_grasps(problem: Any, report: Any, path: Path) -> None:
+def write_grasps(outcomes: Outcomes, report: Any, path: Path) -> None:
     """Write the candidates of a report as an Isaac grasp file."""
     from surehold.grasping.formats import StoredGrasp, write_isaac_grasps
 
+    simulator = outcomes.problem.simulator
+
     def joints(angles: Any) -> dict[str, float]:
-        names = problem.simulator.hand.joint_names
+        names = simulator.hand.joint_names
         return {name: float(angle) for name, angle in zip(names, angles.ravel(), strict=True) if name}
 
     stored = []
     for candidate in report.candidates:
-        outcome = problem.grasp(candidate.x)
+        outcome = outcomes.grasp(candidate.x)
         worth = candidate.mean if candidate.values.size else candidate.quality
         stored.append(
             StoredGrasp(
@@ -235,4 +222,4 @@ def write_grasps(problem: Any, report: Any, path: Path) -> None:
                 joints(outcome.open_joints),
             )
         )
-    write_isaac_grasps(path, stored, problem.object.name, problem.simulator.hand.name)
+    write_isaac_grasps(path, stored, simulator.object.name, simulator.hand.name)

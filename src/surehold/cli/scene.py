@@ -8,19 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from surehold.cli.grasp_options import (
-    Closing,
-    Friction,
-    HandConfigFile,
-    HandName,
-    MeshFrame,
-    MeshMass,
-    MeshUnit,
-    PreshapeName,
-    hand_of,
-    object_of,
-    shown_progress,
-)
+from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.options import Open, Out
 
 __all__ = ["scene"]
@@ -29,6 +17,7 @@ _COLUMNS = ("object", "mode", "standoff [mm]", "s1", "dx, dy [mm]", "status", "q
 _ALONG, _ACROSS = 9, 5  # grasps that are tried in a mode
 
 
+@takes_grasp_options
 def scene(
     obj: Annotated[
         str, typer.Argument(metavar="[OBJECT]", help="mug, bottle, glass, drill, or a mesh file; all four by default.")
@@ -36,25 +25,19 @@ def scene(
     facet: Annotated[
         str, typer.Option(help="One mode such as right-front, one facet such as right, or all.", show_default=False)
     ] = "",
-    unit: MeshUnit = "",
-    mass: MeshMass = None,
-    frame: MeshFrame = None,
-    friction: Friction = None,
-    hand: HandName = "icub-left",
-    hand_config: HandConfigFile = "",
-    preshape: PreshapeName = "",
-    closing: Closing = "adaptive",
-    contact: Annotated[str, typer.Option(help="single, patch or graded (soft touch).")] = "graded",
     out: Out = "",
     open_page: Open = False,
+    **options: Any,
 ) -> None:
     """Browse objects, facets and modes: the best of 45 grasps in each, as a page, JSON and a picture."""
     from surehold.cli.compilation import announced
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
-    from surehold.grasping.object.model import OBJECTS
+    from surehold.grasping.object.shipped import OBJECTS
+    from surehold.grasping.pictures.scene import grasp_scene
     from surehold.problems.grasp.default_poses import default_facet
-    from surehold.problems.grasp.problem import Grasp
+    from surehold.problems.grasp.description import described_grasp, described_hand
+    from surehold.problems.grasp.options import checked_words
     from surehold.reports import gather
     from surehold.reports.run_report import Candidate
     from surehold.reports.scenes_page import render_scenes
@@ -62,8 +45,9 @@ def scene(
     from surehold.store.atomic import checked_folder, write_file
 
     console = terminal()
-    gripper = hand_of(hand, hand_config)
-    quick = hand == "icub-left" and not preshape and (not obj or obj in OBJECTS)
+    words = checked_words(options)
+    gripper = described_hand(words["hand"], words["hand_config"])
+    quick = words["hand"] == "icub-left" and not words["preshape"] and (not obj or obj in OBJECTS)
     if facet:
         _modes(facet)  # explains an unknown one at once
     folder = checked_folder(out or Path("runs") / f"scene-{Path(obj).stem or 'objects'}")
@@ -71,21 +55,13 @@ def scene(
     best = -np.inf
     picture = None
     for name in [obj] if obj else OBJECTS:
-        body = object_of(name, unit, mass, frame, console)
+        described = {**words, "object": name, "variables": ("dx", "dy")}
+        body = object_of(described, console)
         for mode in _modes(facet or ("all" if quick else default_facet(body))):
             with announced(console), shown_progress(f"{body.name}, {mode}", console) as progress:
-                problem = Grasp(
-                    body,
-                    mode,
-                    contact=contact,
-                    closing=closing,
-                    friction=friction,
-                    hand=gripper,
-                    preshape=preshape or None,
-                    progress=progress,
-                )
+                problem = described_grasp({**described, "facet": mode}, body, progress)
             x, outcome, free = _best(problem)
-            drawn = gather.grasp_scene(problem.simulator.scene(outcome))
+            drawn = gather.grasp_scene(grasp_scene(problem.simulator, outcome))
             label = f"{body.name}, {mode}"
             views.append(Candidate(label, x, outcome.quality, scene=drawn))
             shares = f"{100.0 * free:.0f} % of {_ALONG * _ACROSS}"

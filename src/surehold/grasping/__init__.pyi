@@ -2,14 +2,18 @@
 
 from .batch import GraspBatch as GraspBatch
 from .batch import grasp_batch as grasp_batch
-from .closing.closing import CLOSING_MODES as CLOSING_MODES
-from .closing.contacts import CONTACT_MODELS as CONTACT_MODELS
+from .choices import CLOSING_MODES as CLOSING_MODES
+from .choices import COLLISIONS as COLLISIONS
+from .choices import CONTACT_MODELS as CONTACT_MODELS
+from .choices import QUALITIES as QUALITIES
 from .closing.contacts import Contacts as Contacts
 from .formats import GraspFile as GraspFile
 from .formats import StoredGrasp as StoredGrasp
 from .formats import grasp_to_dict as grasp_to_dict
 from .formats import read_isaac_grasps as read_isaac_grasps
 from .formats import write_isaac_grasps as write_isaac_grasps
+from .grasp import STATUSES as STATUSES
+from .grasp import Grasp as Grasp
 from .hand.icub import icub_left_hand as icub_left_hand
 from .hand.icub import icub_right_hand as icub_right_hand
 from .hand.model import Hand as Hand
@@ -18,9 +22,9 @@ from .hand.named import HANDS as HANDS
 from .hand.named import hand_named as hand_named
 from .object.distance_field import DistanceField as DistanceField
 from .object.distance_field import distance_field_of as distance_field_of
-from .object.model import OBJECTS as OBJECTS
 from .object.model import GraspObject as GraspObject
-from .object.model import shipped_object as shipped_object
+from .object.shipped import OBJECTS as OBJECTS
+from .object.shipped import shipped_object as shipped_object
 from .physics.check import GraspCheck as GraspCheck
 from .physics.check import GraspChecker as GraspChecker
 from .pictures.scene import Scene as Scene
@@ -33,9 +37,6 @@ from .poses import FACETS as FACETS
 from .poses import MODES as MODES
 from .poses import Pose as Pose
 from .poses import default_pose as default_pose
-from .simulator import COLLISIONS as COLLISIONS
-from .simulator import STATUSES as STATUSES
-from .simulator import Grasp as Grasp
 from .simulator import Simulator as Simulator
 from .wrench.force_closure import force_closure as force_closure
 from .wrench.force_closure import gravity_wrenches as gravity_wrenches
@@ -43,7 +44,6 @@ from .wrench.force_closure import task_quality as task_quality
 from .wrench.friction_cones import contact_wrenches as contact_wrenches
 from .wrench.friction_cones import soft_finger_torsion as soft_finger_torsion
 from .wrench.hull.inscribed_ball import ball_radius as ball_radius
-from .wrench.quality import QUALITIES as QUALITIES
 from .wrench.simox import ObjectWrenchSpace as ObjectWrenchSpace
 from .wrench.simox import object_wrench_space as object_wrench_space
 from .wrench.simox import simox_quality as simox_quality

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
+from surehold.grasping.grasp import STATUSES
 from surehold.grasping.poses import Pose
-from surehold.grasping.simulator import STATUSES, Simulator
+from surehold.grasping.simulator import Simulator
 
 __all__ = ["GraspBatch", "grasp_batch"]
 

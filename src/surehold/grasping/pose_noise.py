@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.batch import grasp_batch
+from surehold.grasping.grasp import STATUSES
 from surehold.grasping.poses import Pose
-from surehold.grasping.simulator import STATUSES, Simulator
+from surehold.grasping.simulator import Simulator
 
 __all__ = ["DISTURBED", "PoseNoise", "RobustQuality", "disturbed_poses", "robust_quality"]
 

@@ -11,6 +11,7 @@ grasp center, R = R_default Rx Ry Rz.
 """
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Final
 
 import numpy as np
@@ -23,6 +24,7 @@ from surehold.grasping.object.model import GraspObject
 __all__ = ["FACETS", "MODES", "Pose", "default_pose"]
 
 Array = NDArray[np.float64]
+_EYE: Final = np.eye(3)
 
 _NORMALS: Final = {
     "right": (1.0, 0.0, 0.0),
@@ -59,16 +61,12 @@ class Pose:
         r = m[:3, :3]
         if not (np.allclose(r @ r.T, np.eye(3), atol=1e-6) and np.linalg.det(r) > 0.0):
             raise InputError("the 3 x 3 part of the pose matrix is no rotation; its columns must be right-handed axes.")
-        # Bar-Itzhack 2000: the quaternion is the eigenvector of the largest eigenvalue; exact for an exact rotation.
-        k = np.empty((4, 4))
-        k[0, 0] = np.trace(r)
-        k[0, 1:] = k[1:, 0] = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
-        k[1:, 1:] = r + r.T - np.trace(r) * np.eye(3)
-        q = np.linalg.eigh(k / 3.0)[1][:, -1]
-        q = -q if q[np.flatnonzero(np.abs(q) > 1e-12)[0]] < 0.0 else q  # of the two signs, that with w > 0
-        x, y, z = (float(v) for v in m[:3, 3])
-        a, b, c, d = (float(v) for v in q)
-        return cls((x, y, z), (a, b, c, d))
+        return _pose(r, m[:3, 3])
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all seven numbers are finite."""
+        return all(map(isfinite, (*self.position, *self.quaternion)))
 
     @property
     def rotation(self) -> Array:
@@ -103,7 +101,20 @@ class Pose:
 
 
 def _pose(rotation: Array, position: Array) -> Pose:
-    return Pose.from_matrix(np.column_stack([rotation, position]))
+    """Return the pose of a rotation (3, 3), which is one, and a position (3,)."""
+    # Bar-Itzhack 2000: the quaternion is the eigenvector of the largest eigenvalue; exact for an exact rotation.
+    r, (x, y, z) = rotation, position.tolist()
+    k = np.empty((4, 4))
+    trace = r[0, 0] + r[1, 1] + r[2, 2]
+    if not isfinite(trace):
+        raise InputError("a pose's quaternion is zero or not finite; give one of length 1, such as (1, 0, 0, 0).")
+    k[0, 0] = trace
+    k[0, 1:] = k[1:, 0] = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+    k[1:, 1:] = r + r.T - trace * _EYE
+    a, b, c, d = np.linalg.eigh(k / 3.0)[1][:, -1].tolist()
+    first = next(v for v in (a, b, c, d) if abs(v) > 1e-12)
+    q = (-a, -b, -c, -d) if first < 0.0 else (a, b, c, d)  # of the two signs, that with w > 0
+    return Pose((x, y, z), q)
 
 
 def _turn(axis: int, angle: float) -> Array:

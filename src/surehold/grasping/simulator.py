@@ -1,15 +1,15 @@
 """One trial: put the open hand at a pose, close it, find the contacts, measure how well they hold the object."""
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from math import isfinite
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.closing.closing import CLOSING_MODES, Closed, close_hand, hand_gaps
+from surehold.grasping.choices import CLOSING_MODES, COLLISIONS, CONTACT_MODELS
+from surehold.grasping.closing.closing import Closed, close_hand, hand_gaps
 from surehold.grasping.closing.contacts import (
-    CONTACT_MODELS,
     DEPTH,
     SKIN,
     Contacts,
@@ -20,60 +20,25 @@ from surehold.grasping.closing.contacts import (
     skin_samples,
     touch_contacts,
 )
-from surehold.grasping.hand.model import CLOSED, Hand, link_ends, link_frames
+from surehold.grasping.grasp import Grasp, Status
+from surehold.grasping.hand.kinematics import link_ends, link_frames
+from surehold.grasping.hand.model import CLOSED, Hand
 from surehold.grasping.hand.named import hand_named
 from surehold.grasping.hand.synergy import ClosingMotion, closing_motion, preshape_of
 from surehold.grasping.object.distance_field import MARGIN, DistanceField, distance_field_of
-from surehold.grasping.object.model import GraspObject, shipped_object
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.poses import Pose
 from surehold.grasping.wrench.quality import Measure
-from surehold.grasping.wrench.wrench_space import WrenchQuality
 
-if TYPE_CHECKING:
-    from surehold.grasping.pictures.scene import Scene
-
-__all__ = ["COLLISIONS", "STATUSES", "THESIS", "Grasp", "Simulator"]
+__all__ = ["Simulator"]
 
 Array = NDArray[np.float64]
-Status = Literal["ok", "no contact", "initial collision", "not closed"]
 
-#: What became of a trial. "ok": force closure. "no contact": fewer than two contacts. "initial collision": the open
-#: hand is inside the object. "not closed": contacts that do not resist every wrench.
-STATUSES: Final = ("ok", "no contact", "initial collision", "not closed")
-
-#: Worth of a hand that collides while it is open: a penalty that grows with the penetration, or 0.
-COLLISIONS: Final = ("penalty", "zero")
-
-#: Settings of the simulator behind the thesis.
-THESIS: Final = {
-    "contact": "single",
-    "quality": "simox",
-    "closing": "synergy",
-    "cones": "polyhedral",
-    "collision": "zero",
-}
 
 _PENALTY: Final = 0.05  # at the deepest penetration: half of a good epsilon
 _PENALTY_DEPTH: Final = 0.02  # depths of all bodies together at which the penalty is 63 % of that [m]
 _LEAST_SHARE: Final = 1e-3  # outcomes of a smaller share are not looked at
-
-
-@dataclass(frozen=True, eq=False)
-class Grasp:
-    """Outcome of one trial. Points and normals are in the frame of the object."""
-
-    status: Status  #: see `STATUSES`
-    quality: float  #: the measure that was asked for; 0 without two contacts; a collision's is 0 or below
-    pose: Pose  #: from the palm frame to the object's frame
-    s1: float  #: posture variable [rad]
-    joints: Array = field(
-        repr=False
-    )  #: (f, j) joint angles [rad] or shifts [m] at the end, in the hand's order; a collision leaves it open
-    open_joints: Array = field(repr=False)  #: (f, j) joint angles or shifts of the open hand
-    contacts: Contacts = field(repr=False)  #: of the quality; empty after a collision
-    touching: tuple[str, ...] = field(repr=False)  #: names of the links that were stopped by the object
-    penetration: float  #: how deep the open hand is inside the object [m]; 0 without a collision
-    wrench: WrenchQuality | None = field(repr=False, default=None)  #: details of the measure; None without two contacts
 
 
 class _Geometry(NamedTuple):
@@ -177,8 +142,9 @@ class Simulator:
             raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.008 m.")
         self.depth: Final[float] = float(depth)
         self.object_pose: Final[Pose] = Pose() if object_pose is None else object_pose
-        if not np.all(np.isfinite([*self.object_pose.position, *self.object_pose.quaternion])):
+        if not self.object_pose.is_finite:
             raise InputError(f"object_pose {object_pose} is not finite; give finite numbers.")
+        self._to_object: Final[Pose] = self.object_pose.inverse()
         self.field: Final[DistanceField] = self._field()
         self._reach: Final[Array] = self.hand.reach()
         self._samples: Final[Array] = skin_samples(self.hand)
@@ -192,9 +158,9 @@ class Simulator:
         InputError
             If the pose or s1 is not finite.
         """
-        if not np.isfinite(s1) or not np.all(np.isfinite([*pose.position, *pose.quaternion])):
+        if not (isfinite(s1) and pose.is_finite):
             raise InputError(f"pose {pose} with s1 = {s1!r} is not finite; give finite numbers.")
-        relative = self.object_pose.inverse() @ pose
+        relative = self._to_object @ pose
         motion = closing_motion(self.hand, float(s1), self.preshape)
         geometry = self._place(relative)
         opened = motion.joints(0.0)
@@ -205,12 +171,13 @@ class Simulator:
             return Grasp("initial collision", worth, relative, s1, opened, opened, self._no_contacts, (), penetration)
         closed = self._close(geometry, motion)
         contacts = self._contacts(geometry, motion, closed)
-        touching = tuple(dict.fromkeys(self.hand.body_name(int(body)) for body in np.flatnonzero(closed.touched)))
+        touched = np.flatnonzero(closed.touched).tolist()
+        touching = tuple(dict.fromkeys(map(self.hand.body_names.__getitem__, touched)))
         if len(contacts) < 2:
             return Grasp("no contact", 0.0, relative, s1, closed.joints, opened, contacts, touching, 0.0)
-        wrench = self.measure.wrench(contacts)
+        wrench = self.measure.wrench(contacts.points, contacts.normals, contacts.weights)
         status: Status = "ok" if wrench.force_closure else "not closed"
-        worth = float(self.measure.value(contacts, wrench))
+        worth = float(self.measure.value(contacts.points, contacts.normals, wrench))
         return Grasp(status, worth, relative, s1, closed.joints, opened, contacts, touching, 0.0, wrench)
 
     def gaps(self, pose: Pose, joints: ArrayLike, geometry: _Geometry | None = None) -> Array:
@@ -247,17 +214,11 @@ class Simulator:
         geometry = self._place(beside)
         closed = self._close(geometry, motion)
         self.gaps(beside, closed.joints, geometry)
-        closed.touched[3] = True
+        closed.touched[np.argmax(self.hand.radii)] = True  # a link that every hand has
         self._skin(geometry, closed.joints)
         self._touch(geometry, closed)
         points = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
-        self.measure.wrench(Contacts(points, -points, np.ones(4), np.arange(4), ("",) * 4))
-
-    def scene(self, grasp: Grasp, opened: bool = False) -> "Scene":
-        """Return the meshes and contacts of a grasp in the world; with `opened`, of the hand before it closes."""
-        from surehold.grasping.pictures.scene import grasp_scene  # pictures stand on grasps, not the other way round
-
-        return grasp_scene(self, grasp, opened)
+        self.measure.wrench(points, -points, np.ones(4))
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "field"}

@@ -1,7 +1,6 @@
 """What the workers of a study try: the problem that is written into the study, or a function of the user's own."""
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,35 +59,14 @@ def problem_of(settings: StudySettings, function: str = "") -> Callable[[Any], A
     if "synthetic" in described:
         return named_function(described["synthetic"])
     if "grasp" in described:
-        return _grasp(described["grasp"], "thesis" if settings.optimizer.get("preset") == "thesis" else "")
+        from surehold.problems.grasp.description import described_grasp
+
+        # Older studies do not name the simulator's preset; theirs was the optimizer's.
+        before = "thesis" if settings.optimizer.get("preset") == "thesis" else ""
+        return described_grasp({"preset": before, **described["grasp"]})
     raise InputError(
         "the study says nothing about what its trials are; a robot makes them (surehold study ask, tell), or give "
         "--function package.module:function."
-    )
-
-
-def _grasp(described: Mapping[str, Any], preset: str) -> Callable[[Any], Any]:
-    """Return the grasp that `surehold grasp` has described; files are found by the same paths."""
-    from surehold.grasping.hand.files import load_hand
-    from surehold.grasping.hand.named import hand_named
-    from surehold.grasping.object.mesh_files import load_mesh
-    from surehold.problems import Grasp
-
-    obj, hand = described["object"], described["hand"]
-    mesh = Path(obj).suffix or Path(obj).exists()
-    return Grasp(
-        load_mesh(obj, described["unit"] or None, described["mass"], described["frame"] or "auto").object
-        if mesh
-        else obj,
-        described["facet"],
-        described["variables"],
-        contact=described["contact"],
-        quality=described["quality"],
-        closing=described["closing"],
-        friction=described["friction"],
-        hand=load_hand(hand, described["hand config"]) if Path(hand).suffix else hand_named(hand),
-        preshape=described["preshape"] or None,
-        preset=preset,
     )
 
 

@@ -4,7 +4,7 @@ from exact_mesh import ExactMesh, capsule_pair
 
 from surehold.grasping.closing.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap
 from surehold.grasping.object.distance_field import distance_field_of
-from surehold.grasping.object.model import shipped_object
+from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.object.solids import RoundedBox, signed_distance
 from surehold.grasping.poses import Pose
 

@@ -6,7 +6,8 @@ from exact_closing import ExactClosing
 from exact_mesh import ExactMesh, capsule_pair
 
 from surehold.grasping.closing.closing import TOUCH
-from surehold.grasping.hand.model import CLOSED, link_ends
+from surehold.grasping.hand.kinematics import link_ends
+from surehold.grasping.hand.model import CLOSED
 from surehold.grasping.hand.synergy import closing_motion
 from surehold.grasping.poses import default_pose
 from surehold.grasping.simulator import Simulator

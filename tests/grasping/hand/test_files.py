@@ -12,7 +12,7 @@ from surehold.errors import InputError
 from surehold.grasping import GraspChecker, Simulator, default_pose, hand_named
 from surehold.grasping.hand.cover import cover_box, cover_mesh
 from surehold.grasping.hand.files import load_hand
-from surehold.grasping.hand.model import link_ends
+from surehold.grasping.hand.kinematics import link_ends
 from surehold.grasping.hand.synergy import closing_motion
 
 MODEL = """

@@ -4,7 +4,8 @@ from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
 from surehold.grasping.hand.icub import icub_left_hand, icub_right_hand
-from surehold.grasping.hand.model import chain_row, link_ends
+from surehold.grasping.hand.kinematics import link_ends
+from surehold.grasping.hand.model import chain_row
 from surehold.grasping.hand.named import hand_named
 from surehold.grasping.hand.synergy import closing_motion
 from surehold.grasping.poses import Pose, default_pose
@@ -102,8 +103,8 @@ def test_fingers_bend_out_of_the_palm_and_the_thumb_opposes_them():
 
 def test_names():
     hand = icub_left_hand()
-    assert (hand.palm, hand.body_name(20), hand.body_name(0)) == (20, "palm", "index knuckle")
-    assert hand.body_name(19) == "thumb distal"
+    assert (hand.palm, hand.body_names[20], hand.body_names[0]) == (20, "palm", "index knuckle")
+    assert hand.body_names[19] == "thumb distal"
     with pytest.raises(InputError, match="icub-left"):
         hand_named("barrett")
 

@@ -6,7 +6,7 @@ import pytest
 from surehold.errors import InputError
 from surehold.grasping.object.distance_field import MARGIN, cache_folder, distance_field_of
 from surehold.grasping.object.mesh_distance import FAR_INSIDE, FAR_OUTSIDE
-from surehold.grasping.object.model import OBJECTS, shipped_object
+from surehold.grasping.object.shipped import OBJECTS, shipped_object
 from surehold.grasping.object.solids import signed_distance
 
 

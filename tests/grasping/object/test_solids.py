@@ -4,7 +4,8 @@ import trimesh
 from exact_mesh import ExactMesh
 
 from surehold.errors import InputError
-from surehold.grasping.object.model import OBJECTS, GraspObject, shipped_object
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.shipped import OBJECTS, shipped_object
 from surehold.grasping.object.solids import RevolvedProfile, RoundedBox, Tube, signed_distance
 
 

@@ -116,7 +116,7 @@ def test_the_model_weighs_what_the_object_weighs(name):
 def test_the_fingers_of_the_model_are_those_of_the_hand(bottle, checker):
     import mujoco
 
-    from surehold.grasping.hand.model import link_ends
+    from surehold.grasping.hand.kinematics import link_ends
 
     grasp = grasp_at(bottle, -0.032)
     data = mujoco.MjData(checker.model)

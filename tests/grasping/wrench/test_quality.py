@@ -16,7 +16,6 @@ from surehold.grasping import (
     soft_finger_torsion,
     wrench_quality,
 )
-from surehold.grasping.closing.contacts import Contacts
 from surehold.grasping.wrench.quality import GRAVITY_DIRECTIONS, Measure
 
 BOTTLE = shipped_object("bottle")
@@ -91,12 +90,11 @@ def test_a_task_is_in_newtons_and_newton_meters():
 def test_two_soft_fingers_close_and_two_hard_ones_do_not():
     points = BOTTLE.center_of_mass + np.array([[0.026, 0, 0], [-0.026, 0, 0]])
     normals = np.array([[-1.0, 0, 0], [1.0, 0, 0]])
-    contacts = Contacts(points, normals, np.ones(2), np.array([3, 19]))
     hard, soft = (Measure("epsilon", BOTTLE, 0.5, torsion=t) for t in (0.0, soft_finger_torsion(0.5, 0.004)))
-    assert hard.wrench(contacts).epsilon == 0.0
+    assert hard.wrench(points, normals, np.ones(2)).epsilon == 0.0
     # the twist about the line of contacts is the weakest wrench: gamma by the torque length
     expected = soft_finger_torsion(0.5, 0.004) / BOTTLE.torque_length
-    assert soft.wrench(contacts).epsilon == pytest.approx(expected, rel=1e-6)
+    assert soft.wrench(points, normals, np.ones(2)).epsilon == pytest.approx(expected, rel=1e-6)
     _, without = held()
     _, with_torsion = held(torsion=0.002)
     assert with_torsion.quality > without.quality
@@ -114,13 +112,12 @@ def test_torsion_of_a_soft_finger_equals_the_integral_over_its_patch():
 def test_signed_epsilon_tells_how_far_an_open_grasp_is_from_closure():
     points = BOTTLE.center_of_mass + np.array([[0.026, 0, 0], [0.0, 0.026, 0]])
     normals = np.array([[-1.0, 0, 0], [0.0, -1.0, 0]])
-    contacts = Contacts(points, normals, np.ones(2), np.array([3, 19]))
     measure = Measure("signed_epsilon", BOTTLE, 0.5)
-    wrench = measure.wrench(contacts)
+    wrench = measure.wrench(points, normals, np.ones(2))
     expected = wrench_quality(
         points, normals, 0.5, torque_length=BOTTLE.torque_length, origin=BOTTLE.center_of_mass, cones="round"
     ).signed_epsilon
-    assert measure.value(contacts, wrench) == expected < 0.0
+    assert measure.value(points, normals, wrench) == expected < 0.0
 
 
 def test_friction_is_the_objects_own_unless_given():

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
-from surehold.grasping import MODES, Simulator, default_pose, shipped_object
+from surehold.grasping import MODES, GraspObject, Simulator, default_pose, shipped_object
+from surehold.grasping.object.solids import RoundedBox, triangles
+from surehold.problems import Grasp
 from surehold.problems.grasp.default_poses import GraspDefault, grasp_default, search_default
-from surehold.problems.grasp.problem import VARIABLES, Grasp
+from surehold.problems.grasp.options import VARIABLES
 from surehold.problems.problem import Problem
 
 
@@ -133,3 +135,13 @@ def test_the_default_facet_of_the_drill_has_a_grasp_that_holds():
     around = [drill(best + step) for step in 0.003 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])]
     assert drill(best) > 0.1
     assert min(around) > 0.1
+
+
+def test_an_object_of_own_solids_has_its_default_searched():
+    solids = (RoundedBox((0.0, 0.0, 0.04), (0.02, 0.03, 0.04), 0.004),)
+    vertices, faces, volume, center = triangles(solids)
+    for name in ("block", "mug"):  # also under the name of a shipped one
+        own = GraspObject(name, vertices, faces, 900.0 * volume, center, 0.5, solids)
+        problem = Grasp(own)
+        assert 0.02 / 3.0 - 1e-4 <= problem.default.standoff <= 0.04 + 1e-4
+        assert problem.facet == "right-front"

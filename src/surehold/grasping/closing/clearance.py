@@ -73,7 +73,7 @@ def capsule_gap(nodes, frame, near, far, radius, tolerance, slack):
 @njit(cache=True)
 def capsule_pair_gap(p, q, u, v, radii):
     """Return the gap between capsules of axes p-q and u-v whose radii sum to `radii` [m] (Lumelsky 1985)."""
-    aa, bb, ab, ac, bc, cc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    aa, bb, ab, ac, bc = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         a, b, c = q[i] - p[i], v[i] - u[i], u[i] - p[i]
         aa += a * a
@@ -81,7 +81,6 @@ def capsule_pair_gap(p, q, u, v, radii):
         ab += a * b
         ac += a * c
         bc += b * c
-        cc += c * c
     det = aa * bb - ab * ab
     s = 0.0
     if det > 1e-12 * aa * bb:

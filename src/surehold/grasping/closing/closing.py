@@ -26,14 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.grasping.closing.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap
-from surehold.grasping.hand.model import axis_ends, finger_frames
+from surehold.grasping.hand.kinematics import axis_ends, finger_frames
 from surehold.store.kernels import njit
 
-__all__ = ["CLOSING_MODES", "TOUCH", "Closed", "close_hand", "hand_gaps"]
+__all__ = ["TOUCH", "Closed", "close_hand", "hand_gaps"]
 
-CLOSING_MODES: Final = ("adaptive", "synergy")
 TOUCH: Final = 5e-6  #: a smaller gap is a touch [m]
-_PALM_LINK = 2  # from this link on a finger can reach the palm
 
 
 class Closed(NamedTuple):
@@ -140,8 +138,10 @@ def close_hand(
 ):
     """Close the hand from its open posture, which must not touch the object.
 
-    Passes nearer than `brush` are reported (0: none). `stop` (f, j) holds times at which joints are stopped, whatever
-    they touch, infinite for none; it is changed to the times at which they were. Returns the fields of `Closed`.
+    A link is stopped by the palm or by another finger unless it touches that at its first look already: neighbors in
+    the chain rest on each other. Passes nearer than `brush` are reported (0: none). `stop` (f, j) holds times at which
+    joints are stopped, whatever they touch, infinite for none; it is changed to the times at which they were.
+    Returns the fields of `Closed`.
     """
     fingers, per_finger = radii.shape
     links = fingers * per_finger
@@ -160,7 +160,7 @@ def close_hand(
             continue
         first[total] = b
         total += 1
-        for p in range(palms.shape[0] if k >= _PALM_LINK else 0):
+        for p in range(palms.shape[0]):
             first[total], second[total] = b, -2 - p
             total += 1
         for c in range((f + 1) * per_finger, links):

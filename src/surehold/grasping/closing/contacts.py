@@ -28,12 +28,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.grasping.closing.clearance import capsule_gap
-from surehold.grasping.hand.model import Hand, link_frames
+from surehold.grasping.hand.kinematics import link_frames
+from surehold.grasping.hand.model import Hand
 from surehold.grasping.object.distance_field import field_distance, field_distance_gradient
 from surehold.store.kernels import njit
 
 __all__ = [
-    "CONTACT_MODELS",
     "DEPTH",
     "Contacts",
     "as_contacts",
@@ -46,7 +46,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-CONTACT_MODELS: Final = ("graded", "patch", "single")
 DEPTH: Final = 0.006  #: depth of the soft touch, delta [m]: what is so near is reached as finger and object give way
 SKIN: Final = 0.002  #: thickness of the skin, rho [m]
 STATIONS: Final = 5  #: rings of samples along a link
@@ -266,5 +265,5 @@ def as_contacts(rows: NDArray[np.float64], hand: Hand) -> Contacts:
     """Return the rows (c, 8) of the compiled functions as `Contacts`; rows of weight zero are left out."""
     rows = rows[rows[:, 6] > 0.0]
     bodies = rows[:, 7].astype(np.int64)
-    names = tuple(hand.body_name(int(body)) for body in bodies)
+    names = tuple(map(hand.body_names.__getitem__, bodies.tolist()))
     return Contacts(rows[:, :3].copy(), rows[:, 3:6].copy(), rows[:, 6].copy(), bodies, names)

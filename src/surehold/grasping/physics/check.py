@@ -26,9 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.grasping.grasp import Grasp
 from surehold.grasping.physics.convex_pieces import convex_pieces
 from surehold.grasping.poses import Pose
-from surehold.grasping.simulator import Grasp, Simulator
+from surehold.grasping.simulator import Simulator
 from surehold.grasping.wrench.friction_cones import soft_finger_torsion
 
 __all__ = ["LOADS", "GraspCheck", "GraspChecker", "LoadOutcome"]

@@ -5,10 +5,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.grasping.hand.model import Hand, link_frames
+from surehold.grasping.grasp import Grasp
+from surehold.grasping.hand.kinematics import link_frames
+from surehold.grasping.hand.model import Hand
 from surehold.grasping.hand.synergy import closing_motion
 from surehold.grasping.poses import Pose
-from surehold.grasping.simulator import Grasp, Simulator
+from surehold.grasping.simulator import Simulator
 
 __all__ = ["Scene", "SceneMesh", "grasp_scene"]
 
@@ -26,11 +28,6 @@ class SceneMesh:
     vertices: NDArray[np.float32] = field(repr=False)  #: (v, 3) m, in the body's frame
     faces: NDArray[np.int32] = field(repr=False)  #: (f, 3), counterclockwise seen from outside
     poses: NDArray[np.float32] = field(repr=False)  #: (k, 3, 4) body's frame in the world while the hand closes
-
-    @property
-    def placed(self) -> NDArray[np.float32]:
-        """Vertices (v, 3) in the world at the end [m]."""
-        return self.vertices @ self.poses[-1, :, :3].T + self.poses[-1, :, 3]
 
 
 @dataclass(frozen=True, eq=False)

@@ -199,16 +199,20 @@ def tangent_field(n: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def finite_array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Return values as a finite float64 array of the given shape (None: any length) or raise InputError."""
-    wanted = "(" + ", ".join("c" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
     try:
         a = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be numbers of shape {wanted}; {error}.") from None
-    if a.ndim != len(shape) or any(n is not None and n != k for n, k in zip(shape, a.shape, strict=True)):
-        raise InputError(f"{name} must have shape {wanted}, not {a.shape}.")
+        raise InputError(f"{name} must be numbers of shape {_shape_text(shape)}; {error}.") from None
+    wanted = a.shape[:1] + shape[1:] if shape[0] is None else shape
+    if a.ndim != len(shape) or a.shape != wanted:
+        raise InputError(f"{name} must have shape {_shape_text(shape)}, not {a.shape}.")
     if not np.isfinite(a).all():
         raise InputError(f"{name} must be finite, but holds NaN or infinity; check the contacts first.")
     return a
+
+
+def _shape_text(shape: tuple[int | None, ...]) -> str:
+    return "(" + ", ".join("c" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
 
 
 def _coefficients(name: str, value: float | ArrayLike, c: int) -> NDArray[np.float64]:

@@ -29,16 +29,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.closing.contacts import Contacts
+from surehold.grasping.choices import CONES, QUALITIES
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.wrench.force_closure import force_closure, gravity_wrenches, task_quality
 from surehold.grasping.wrench.friction_cones import CONVENTIONS, Convention, finite_array
 from surehold.grasping.wrench.simox import ObjectWrenchSpace, object_wrench_space, simox_quality
-from surehold.grasping.wrench.wrench_space import CONES, WrenchQuality, wrench_quality
+from surehold.grasping.wrench.wrench_space import WrenchQuality, wrench_quality
 
-__all__ = ["GRAVITY_DIRECTIONS", "QUALITIES", "Measure"]
+__all__ = ["GRAVITY_DIRECTIONS", "Measure"]
 
-QUALITIES: Final = ("epsilon", "signed_epsilon", "volume", "simox", "task", "closure")
+Array = NDArray[np.float64]
+
 
 _SIGNS = np.array([s for s in product((-1.0, 0.0, 1.0), repeat=3) if abs(s[0]) + abs(s[1]) + abs(s[2]) in (1.0, 3.0)])
 #: Towards the faces and the corners of a cube, (14, 3).
@@ -78,27 +79,27 @@ class Measure:
             raise InputError(f"a task is given, but the quality is {self.name!r}; ask for quality='task'.")
         self._task_wrenches  # noqa: B018  # a bad task is refused at once
 
-    def wrench(self, contacts: Contacts) -> WrenchQuality:
-        """Return epsilon with its bounds and what else belongs to it."""
+    def wrench(self, points: Array, normals: Array, weights: Array) -> WrenchQuality:
+        """Return epsilon with its bounds of contacts at points (c, 3) [m] with inward normals (c, 3), weights (c,)."""
         return wrench_quality(
-            contacts.points,
-            contacts.normals,
+            points,
+            normals,
             friction=self.friction,
             edges=self.edges,
             torque_length=self.obj.torque_length,
             origin=self.obj.center_of_mass,
             convention=self.convention,
-            weights=contacts.weights,
+            weights=weights,
             torsion=self.torsion,
             cones=self.cones,
         )
 
-    def value(self, contacts: Contacts, wrench: WrenchQuality) -> float:
+    def value(self, points: Array, normals: Array, wrench: WrenchQuality) -> float:
         """Return the measure of at least two contacts, whose `wrench` is given."""
         if self.name == "signed_epsilon":
             return wrench.signed_epsilon
         if self.name == "simox":
-            return simox_quality(contacts.points, contacts.normals, self._object_space)
+            return simox_quality(points, normals, self._object_space)
         if self.name == "task":
             return task_quality(wrench.wrenches, self._task_wrenches)
         if self.name == "closure":
@@ -112,7 +113,7 @@ class Measure:
         return object_wrench_space(self.obj.vertices, self.obj.faces)
 
     @cached_property
-    def _task_wrenches(self) -> NDArray[np.float64]:
+    def _task_wrenches(self) -> Array:
         if self.task is None:
             center = self.obj.center_of_mass
             return gravity_wrenches(1.0, center, GRAVITY_DIRECTIONS, self.obj.torque_length, center)

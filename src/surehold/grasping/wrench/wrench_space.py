@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import unknown_name
+from surehold.grasping.choices import CONES
 from surehold.grasping.wrench.friction_cones import (
     CheckedContacts,
     Convention,
@@ -43,8 +44,6 @@ __all__ = [
     "tangents",
     "wrench_quality",
 ]
-
-CONES = ("polyhedral", "round")
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from surehold.grasping.hand.synergy import closing_motion, preshape_of
 from surehold.grasping.object.distance_field import cache_folder, content_hash
-from surehold.grasping.object.model import OBJECTS, GraspObject
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.shipped import OBJECTS, shipped_object
 from surehold.grasping.poses import MODES, Pose, default_pose, facet_axes
 from surehold.grasping.simulator import Simulator
 from surehold.store.atomic import replacing
@@ -150,7 +151,7 @@ def grasp_default(
     What was searched is kept in the cache folder. `progress` is called with the share of a search that is done.
     """
     hand, obj = simulator.hand, simulator.object
-    if obj.solids and hand.name == "icub-left" and simulator.preshape == "power":
+    if _is_shipped(obj) and hand.name == "icub-left" and simulator.preshape == "power":
         standoff, s1 = _TABLE[(obj.name, mode)]
         return GraspDefault(standoff * 1e-3, s1)
     numbers = (np.round(obj.vertices, 9), obj.faces, obj.axes, np.array([obj.friction]), *hand.arrays())
@@ -170,7 +171,12 @@ def default_facet(obj: GraspObject) -> str:
 
     The drill is held at its grip and battery: from the side no grasp is found that holds when the hand is off.
     """
-    return "bottom-front" if obj.solids and obj.name == "drill" else "right-front"
+    return "bottom-front" if obj.name == "drill" and _is_shipped(obj) else "right-front"
+
+
+def _is_shipped(obj: GraspObject) -> bool:
+    """Return whether an object has the shape of the shipped one of its name."""
+    return obj.name in OBJECTS and np.array_equal(obj.vertices, shipped_object(obj.name).vertices)
 
 
 def _load(path: Path) -> GraspDefault | None:

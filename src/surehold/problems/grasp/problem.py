@@ -10,38 +10,28 @@ Bounds (after the published grasp experiments): dx within ±(b + 25 mm), dy with
 from the box center within h/3 and h/3 + 40 mm (1 + h / 50 mm), turns within ±45 degrees, s1 where it moves the thumb.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final, Literal
+from collections.abc import Callable, Sequence
+from typing import Any, Final, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.hand.model import Hand
+from surehold.grasping.grasp import Grasp as GraspOutcome
 from surehold.grasping.hand.synergy import preshape_of
-from surehold.grasping.object.model import GraspObject, shipped_object
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.poses import Pose, default_pose, facet_axes
-from surehold.grasping.simulator import THESIS, Simulator
-from surehold.grasping.simulator import Grasp as GraspOutcome
+from surehold.grasping.simulator import Simulator
 from surehold.optimization.box import Box
 from surehold.problems.grasp.default_poses import GraspDefault, default_facet, grasp_default
+from surehold.problems.grasp.options import OPTIONS, THESIS_SIMULATOR, VARIABLES, GraspOptions
 from surehold.problems.problem import checked_points
 
-__all__ = ["VARIABLES", "Grasp"]
-
-#: All variables of a grasp, and their units.
-VARIABLES: Final[Mapping[str, str]] = {
-    "dx": "m",
-    "dy": "m",
-    "dz": "m",
-    "rx": "rad",
-    "ry": "rad",
-    "rz": "rad",
-    "s1": "rad",
-}
+__all__ = ["Grasp", "GraspProblem"]
 
 
-class Grasp:
+class GraspProblem:
     """The quality of a grasp as a function of some of its seven variables.
 
     Parameters
@@ -54,10 +44,10 @@ class Grasp:
     variables
         Names of the free variables, a subset of `VARIABLES`; their order is the order of the coordinates.
     contact, quality, closing, friction, torsion, cones, task, collision, hand, preshape
-        As in `surehold.grasping.Simulator`.
+        As in `surehold.grasping.Simulator`; these and the following are described in options.py.
     preset
         "thesis": single contacts, the quality "simox", closing "synergy", polyhedral cones, collisions worth 0, and s1
-        within ±pi, whatever is said of them; "" for none.
+        within ±pi; "" for none.
     bounds
         `{name: (lower, upper)}` in m and rad for free variables that shall not have the bounds given above.
     fixed
@@ -76,7 +66,8 @@ class Grasp:
     Raises
     ------
     InputError
-        If a name is unknown, a variable is named twice or both free and fixed, or a bound or value is not finite.
+        If a name is unknown, a variable is named twice or both free and fixed, a bound or value is not finite, or an
+        option contradicts the preset.
     """
 
     def __init__(
@@ -85,31 +76,24 @@ class Grasp:
         facet: str = "",
         variables: Sequence[str] = ("dx", "dy"),
         *,
-        contact: str = "graded",
-        quality: str = "epsilon",
-        closing: str = "adaptive",
-        friction: float | None = None,
-        torsion: float = 0.0,
-        cones: Literal["polyhedral", "round"] = "round",
-        task: ArrayLike | None = None,
-        collision: str = "penalty",
-        preset: str = "",
-        hand: str | Hand = "icub-left",
-        preshape: str | None = None,
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        fixed: Mapping[str, float] | None = None,
         progress: Callable[[float], None] = lambda share: None,
+        **options: Unpack[GraspOptions],
     ):
+        for name in options:
+            if name not in GraspOptions.__annotations__:
+                raise unknown_name("option of a grasp", name, GraspOptions.__annotations__)
+        given: dict[str, Any] = {name: OPTIONS[name].default for name in GraspOptions.__annotations__} | dict(options)
+        preset, bounds, fixed = given.pop("preset"), given.pop("bounds") or {}, given.pop("fixed") or {}
         names = (variables,) if isinstance(variables, str) else tuple(variables)
-        for name in [*names, *(bounds or {}), *(fixed or {})]:
+        for name in [*names, *bounds, *fixed]:
             if name not in VARIABLES:
                 raise unknown_name("variable", name, VARIABLES)
         if len(set(names)) != len(names) or not names:
             raise InputError(f"variables are {names}; name one or more of {', '.join(VARIABLES)}, each once.")
-        for name in bounds or {}:
+        for name in bounds:
             if name not in names:
                 raise InputError(f"bounds are given for '{name}', which is not free; add it to the variables {names}.")
-        for name, value in (fixed or {}).items():
+        for name, value in fixed.items():
             if name in names:
                 raise InputError(f"'{name}' is both free and fixed; take it out of one of the two.")
             if not np.isfinite(value):
@@ -120,34 +104,27 @@ class Grasp:
         self.object: Final[GraspObject] = body
         self.facet: Final[str] = facet
         self.name: Final[str] = f"{body.name}, {facet}"
-        self._settings: dict[str, Any] = {
-            "contact": contact,
-            "quality": quality,
-            "closing": closing,
-            "friction": friction,
-            "torsion": torsion,
-            "cones": cones,
-            "task": task,
-            "collision": collision,
-            "hand": hand,
-            "preshape": preshape,
-        }
-        if preset not in ("", "thesis"):
+        if preset not in OPTIONS["preset"].choices:
             raise unknown_name("preset", preset, ["thesis"])
-        if preset:
-            self._settings |= THESIS
+        for name, value in THESIS_SIMULATOR.items() if preset else ():
+            if options.get(name, value) != value:
+                raise InputError(
+                    f"preset '{preset}' sets {name} to {value!r}, but {given[name]!r} is given; leave one of them out."
+                )
+        self._settings: dict[str, Any] = given | (THESIS_SIMULATOR if preset else {})
+        self._settings["preshape"] = given["preshape"] or None
         self._simulator: Simulator | None = None
         self._simulator = self._build()
         chosen = preshape_of(self._simulator.hand, self._simulator.preshape)
         self._s1_range = chosen.s1_range if preset else chosen.s1_useful
         self.default: Final[GraspDefault] = grasp_default(self.simulator, facet, progress)
-        self._fixed: dict[str, float] = dict.fromkeys(VARIABLES, 0.0) | {"s1": self.default.s1} | dict(fixed or {})
-        if "s1" in names and "s1" not in (bounds or {}) and self._s1_range[0] >= self._s1_range[1]:
+        self._fixed: dict[str, float] = dict.fromkeys(VARIABLES, 0.0) | {"s1": self.default.s1} | dict(fixed)
+        if "s1" in names and "s1" not in bounds and self._s1_range[0] >= self._s1_range[1]:
             raise InputError(
                 f"the preshape '{self._simulator.preshape}' of hand '{self._simulator.hand.name}' has no posture "
                 "variable; take s1 out of the variables."
             )
-        limits = self._limits(np.abs(axes.T) @ body.box_half_extents) | dict(bounds or {})
+        limits = self._limits(np.abs(axes.T) @ body.box_half_extents) | dict(bounds)
         self.box: Final[Box] = Box({name: limits[name] for name in names})
         self.units: Final[tuple[str, ...]] = tuple(VARIABLES[name] for name in names)
 
@@ -164,13 +141,12 @@ class Grasp:
 
     def pose(self, x: ArrayLike) -> Pose:
         """Return the pose of the palm in the object's frame at x (d,)."""
-        values = self._values(self._one(x))
-        offsets = [values[name] for name in ("dx", "dy", "dz", "rx", "ry", "rz")]
-        return default_pose(self.simulator.hand, self.object, self.facet, self.default.standoff, offsets)
+        return self._pose(self._values(self._one(x)))
 
     def grasp(self, x: ArrayLike) -> GraspOutcome:
         """Return the whole outcome of the trial at x (d,)."""
-        return self.simulator.grasp(self.pose(x), self._values(self._one(x))["s1"])
+        values = self._values(self._one(x))
+        return self.simulator.grasp(self._pose(values), values["s1"])
 
     def __call__(self, x: ArrayLike) -> float | NDArray[np.float64]:
         """Return the quality at x (d,) as a float, or the qualities at x (n, d) as an array (n,)."""
@@ -185,6 +161,10 @@ class Grasp:
         if not np.all(np.isfinite(points)):
             raise InputError(f"x = {points[0].tolist()} is not finite; give a point of {self.box!r}.")
         return points[0]
+
+    def _pose(self, values: dict[str, float]) -> Pose:
+        offsets = [values[name] for name in ("dx", "dy", "dz", "rx", "ry", "rz")]
+        return default_pose(self.simulator.hand, self.object, self.facet, self.default.standoff, offsets)
 
     def _values(self, x: NDArray[np.float64]) -> dict[str, float]:
         return self._fixed | self.box.as_dict(x)
@@ -213,3 +193,6 @@ class Grasp:
 
     def __repr__(self) -> str:
         return f"<grasp {self.name}: {self._settings['contact']} contacts, {self.box!r}>"
+
+
+Grasp = GraspProblem  # its public name is surehold.problems.Grasp

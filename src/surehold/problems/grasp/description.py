@@ -1,0 +1,73 @@
+"""From a grasp in words, as a command line, a stored study or a plan says it, to the problem."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from surehold.errors import InputError
+from surehold.grasping.hand.model import Hand
+from surehold.grasping.hand.named import hand_named
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.shipped import OBJECTS, shipped_object
+from surehold.problems.grasp.options import OPTIONS, THESIS_SIMULATOR, GraspOptions, checked_words
+from surehold.problems.grasp.problem import GraspProblem
+
+__all__ = ["described_grasp", "described_hand", "described_object"]
+
+
+def described_grasp(
+    words: Mapping[str, Any], obj: GraspObject | None = None, progress: Callable[[float], None] = lambda share: None
+) -> GraspProblem:
+    """Return the problem of a `DescribedGrasp`; files are found by their paths, `obj` is what was loaded before.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a file is refused, or a value is out of range.
+    """
+    given = checked_words(words)
+    body = obj or described_object(given["object"], given["unit"], given["mass"], given["frame"])[0]
+    hand = described_hand(given["hand"], given["hand_config"])
+    # A command line says every option: what has its default does not contradict a preset.
+    unsaid = {name for name in THESIS_SIMULATOR if given[name] == OPTIONS[name].default}
+    options: Any = {name: given[name] for name in GraspOptions.__annotations__ if name not in unsaid}
+    return GraspProblem(body, given["facet"], given["variables"], **(options | {"hand": hand}), progress=progress)
+
+
+def described_object(name: str, unit: str, mass: float | None, frame: str | None) -> tuple[GraspObject, str]:
+    """Return a shipped object, or the mesh of a file, and the diagnosis of a mesh.
+
+    Raises
+    ------
+    InputError
+        If the file is refused, or options of a mesh are given for a shipped object.
+    """
+    if name in OBJECTS or not (Path(name).suffix or Path(name).exists()):
+        options = {"unit": unit or None, "mass": mass, "frame": frame or None}
+        given = [option for option, value in options.items() if value is not None]
+        if name in OBJECTS and given:
+            raise InputError(f"{given[0]} is for mesh files; '{name}' is shipped with its own size and mass.")
+        return shipped_object(name), ""
+    from surehold.grasping.object.mesh_files import load_mesh
+
+    loaded = load_mesh(name, unit or None, mass, frame or "auto")
+    return loaded.object, loaded.diagnosis
+
+
+def described_hand(name: str, config: str) -> Hand:
+    """Return the hand of a name or of a model file with its description.
+
+    Raises
+    ------
+    InputError
+        If the hand is unknown, a file is refused, or one of model and description is missing.
+    """
+    if not Path(name).suffix:
+        if config:
+            raise InputError(f"hand-config describes a model file; give that as the hand, not '{name}'.")
+        return hand_named(name)
+    if not config:
+        raise InputError(f"hand {name} is a model file; describe its palm and fingers with hand-config: a YAML file.")
+    from surehold.grasping.hand.files import load_hand
+
+    return load_hand(name, config)

@@ -1,0 +1,43 @@
+"""`surehold grasp`: how often it closes the hand, and what a preset sets."""
+
+import json
+
+import pytest
+
+from surehold.cli import run
+from surehold.grasping import Simulator
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_no_grasp_is_closed_twice(here, monkeypatch):
+    poses, grasp = [], Simulator.grasp
+
+    def counted(self, pose, s1=0.0):
+        poses.append((pose, s1))
+        return grasp(self, pose, s1)
+
+    monkeypatch.setattr(Simulator, "grasp", counted)
+    assert run(["grasp", "mug", "--trials", "12", "--initial", "11", "--noise", "0.03", "--out", "mug"]) == 0
+    assert (here / "mug" / "grasps.yaml").exists()
+    assert len(poses) > 100, "12 trials, and the re-queries of one or two candidates"
+    assert len(set(poses)) == len(poses)
+
+
+def test_the_preset_of_the_thesis_grasps_as_the_thesis(here):
+    line = "grasp bottle --preset thesis-grasp --trials 3 --initial 3 --noise none --method bo --out b"
+    assert run(line.split()) == 0
+    settings = json.loads((here / "b" / "result.json").read_text())["settings"]
+    assert (settings["contact"], settings["quality"], settings["closing"]) == ("single", "simox", "synergy")
+    assert settings["preset"] == "thesis-grasp"
+
+
+def test_the_preset_of_another_problem_is_refused(here, capsys):
+    assert run(["grasp", "bottle", "--preset", "thesis-rkhs"]) != 0
+    assert "preset of a grasp 'thesis-rkhs' is unknown" in " ".join(capsys.readouterr().err.split())
+    assert run(["grasp", "bottle", "--preset", "thesis", "--contact", "patch"]) != 0
+    assert "sets contact to 'single'" in " ".join(capsys.readouterr().err.split())
