@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import lapack
 from threadpoolctl import threadpool_limits
 
-from surehold.optimization.surrogates.gaussian_process.likelihood import cholesky
+from surehold.optimization.numerics.cholesky import cholesky
 
 SIZES = (5, 10, 20, 40, 80, 140, 190, 400, 1000)
 ROUNDS, COPIES = 9, 50

@@ -13,8 +13,6 @@ from surehold.campaigns.plan_file import load_plan
 from surehold.campaigns.problem_setup import SimoxGrasp, build_problem
 from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.strategy.presets import TreedSettings
-from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.surrogates.protocol import Posterior, mixture
 from surehold.problems.synthetic import synthetic_function
 from surehold.reports import gather
@@ -190,11 +188,7 @@ def _grasp_of(on: ProblemSetup) -> SimoxGrasp:
 
 def _conditioned(X: NDArray[np.float64], surrogate: str) -> Posterior:
     problem = synthetic_function("rkhs")
-    thesis = thesis_preset("thesis-rkhs")
-    tree = TreedSettings(thesis.min_leaf, continued=True).surrogate(thesis.gaussian_process(), problem.box, None, 0)
-    optimizer = Optimizer(
-        problem.box, surrogate=tree if surrogate == "tgp" else "gp", preset="thesis-rkhs", n_initial=len(X)
-    )
+    optimizer = Optimizer(problem.box, surrogate=surrogate, preset="thesis-rkhs", n_initial=len(X))
     for x in X:
         optimizer.tell(x, float(np.asarray(problem(x))))
     return optimizer.posterior

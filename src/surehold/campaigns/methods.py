@@ -16,10 +16,10 @@ from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.strategy.presets import TREED, TreedSettings
 from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.named import SURROGATES
+from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, least_leaf_width
 
 __all__ = ["METHODS", "Method", "build_method", "checked_method", "checked_settings"]
 
@@ -147,13 +147,16 @@ def checked_settings(where: str, optimizer: str, settings: Mapping[str, Any], ro
         raise InputError(f"{where}: '{optimizer}' cannot be told of input noise; leave `robust` out.")
 
 
-def _treed(own: dict[str, Any], box: Box, input_noise: InputNoise | None, seed: int) -> Any:
-    thesis = None if own.get("preset") is None else thesis_preset(own["preset"])
-    changes = {name: own.pop(name) for name in _TREE if name in own}
-    process_settings: dict[str, Any] = {name: own[name] for name in _PROCESS if own.get(name) is not None}
-    if "weight_power" in changes:
-        changes["weight_power"] = float(changes["weight_power"])
-    if thesis is None:
-        return TREED._replace(**changes).surrogate(GaussianProcess(**process_settings), box, input_noise, seed)
-    tree = TreedSettings(thesis.min_leaf, continued=True)._replace(**changes)
-    return tree.surrogate(thesis.gaussian_process(), box, input_noise, seed)
+def _treed(own: dict[str, Any], box: Box, input_noise: InputNoise | None, seed: int) -> TreedGaussianProcess:
+    """Return the tree of a plan's settings, which are taken out of `own`."""
+    deviations = np.zeros(box.dimension)
+    if input_noise is not None:
+        deviations = np.sqrt(np.diag(input_noise.unit_covariance(box)))
+    tree = {name: own.pop(name) for name in _TREE if name in own}
+    if "weight_power" in tree:
+        tree["weight_power"] = float(tree["weight_power"])
+    if own.get("preset") is not None:
+        return thesis_preset(own["preset"]).tree(deviations, seed, **tree)
+    process = {name: own.pop(name) for name in _PROCESS if own.get(name) is not None}
+    margin = least_leaf_width(deviations)
+    return TreedGaussianProcess(process=GaussianProcess(**process), margin=margin, seed=seed, **tree)

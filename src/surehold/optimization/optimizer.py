@@ -5,7 +5,7 @@ Legend
     t   trials told, failed ones included
 """
 
-from typing import Final, Literal, cast
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.lattice import Lattice, LatticePosterior
+from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
@@ -27,14 +28,9 @@ from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.strategy.trust_region import TrustRegion
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
-from surehold.optimization.surrogates.named import surrogate_named
-from surehold.optimization.surrogates.noisy_inputs import (
-    NoisySurrogate,
-    condition_on_noisy_inputs,
-    noise_from_reached,
-    noise_from_repeats,
-)
-from surehold.optimization.surrogates.protocol import Posterior, Surrogate, mixture
+from surehold.optimization.surrogates.named import refuse_settings, surrogate_named
+from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
+from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate, mixture
 from surehold.optimization.trials import Trials, same
 
 __all__ = ["Optimizer"]
@@ -55,8 +51,9 @@ class Optimizer:
     surrogate
         "gp" (default), "tgp" (a treed Gaussian process, for functions that are smooth here and rough there),
         "local_global" (rough around a center that is learnt, smooth elsewhere; the fewest trials where little of the
-        box matters, at three times the time; no observation noise), or an object with the method `condition` (see
-        `surrogate.Surrogate`).
+        box matters, at three times the time; no observation noise), or an object such as `GaussianProcess(...)`: see
+        `surrogates.protocol.Surrogate`. An object says by its attribute `noisy` whether observations carry noise;
+        without that attribute they are taken for exact.
     criterion
         "ei", "log_ei", "pi", "ucb"; with input noise also "uei", "ulog_ei", "upi", "uucb" (the criterion averaged over
         sigma points) and "robust_ei", ... (the criterion of the averaged outcome); "thompson" and "robust_thompson"
@@ -69,10 +66,12 @@ class Optimizer:
     seed
         Non-negative integer.
     noise
-        Observation noise of "gp": "none" (default), its standard deviation in the outputs' units, "inferred", or
-        "heteroscedastic" (inferred, differing from place to place).
+        Observation noise of "gp" and "tgp": "none" (what None, the default, stands for), its standard deviation in the
+        outputs' units, "inferred", or "heteroscedastic" (inferred, differing from place to place). A surrogate object
+        and a thesis preset have their own: there it must be None, not given.
     output_range
-        (lowest, highest) value to expect, if known.
+        (lowest, highest) value to expect, if known; None (default) where it is not, and beside a surrogate object or a
+        thesis preset.
     quadrature
         How the input noise is averaged over: "unscented" (default of the criteria averaged over sigma points),
         "scaled_unscented", "central_difference", "gauss_hermite" or "quasi_monte_carlo" (default of the robust ones);
@@ -92,7 +91,8 @@ class Optimizer:
         Where the input noise acts. False (default): only when the answer is used; trials reach what is commanded, as in
         a simulator. True: trials stray, too. Those whose reached input is told (`tell(x, y, reached=...)`) are learnt
         from where they were; the others count as less precise where the function is steep (McHutchon and Rasmussen
-        2011; left out where observation noise is inferred, which contains it).
+        2011; left out where observation noise is inferred, which contains it). Needs a surrogate that takes the noise
+        of single trials: "gp", "tgp" or such an object.
     trust_region
         Whether the next trial is sought in a box around the best one that grows with success and shrinks without
         (after TuRBO): an option for six variables and more; off by default.
@@ -118,7 +118,7 @@ class Optimizer:
         n_initial: int | None = None,
         design: str = "latin_hypercube",
         seed: int = 0,
-        noise: float | NoiseName = "none",
+        noise: float | NoiseName | None = None,
         output_range: tuple[float, float] | None = None,
         quadrature: str | None = None,
         k: float = 1.0,
@@ -137,11 +137,19 @@ class Optimizer:
         self.seed: Final = _count("seed", seed, 0)
         self.n_initial: Final = _count("n_initial", self.default_n_initial(box) if n_initial is None else n_initial, 1)
         thesis = None if preset is None else thesis_preset(preset)
-        self._surrogate: Surrogate = (
-            surrogate_named(surrogate, box, input_noise, self.seed, noise, output_range, thesis)
-            if isinstance(surrogate, str)
-            else surrogate
-        )
+        deviations = np.zeros(box.dimension)
+        if input_noise is not None:
+            deviations = np.sqrt(np.diag(input_noise.unit_covariance(box)))
+        if not isinstance(surrogate, str):
+            refuse_settings("a surrogate object", noise, output_range)
+            self._surrogate: Surrogate = surrogate
+        elif thesis is not None:
+            refuse_settings(f"preset='{preset}'", noise, output_range)
+            self._surrogate = thesis.surrogate(surrogate, deviations, self.seed)
+        else:
+            self._surrogate = surrogate_named(
+                surrogate, noise=noise, output_range=output_range, input_deviations=deviations, seed=self.seed
+            )
         if input_noise is not None:
             input_noise.warn_if_larger_than(box)
         self._strategy = strategy_named(
@@ -153,16 +161,17 @@ class Optimizer:
             k=k,
             border=border,
             kappa=kappa,
-            noisy=(noise != "none" and noise != 0.0) or noise_while_exploring,
+            noisy=getattr(self._surrogate, "noisy", False) or noise_while_exploring,
             trust_region=TrustRegion(self.n_initial) if trust_region else None,
             thesis=thesis,
         )
-        if noise_while_exploring and (input_noise is None or thesis is not None or surrogate not in ("gp", "tgp")):
+        takes_noise = isinstance(self._surrogate, NoisySurrogate)
+        if noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
             raise InputError(
-                "noise_while_exploring needs input_noise= and the surrogate 'gp' or 'tgp', without a thesis preset."
+                "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials ('gp', "
+                "'tgp', or an object with known_noise), without a thesis preset."
             )
-        self._straying = noise_while_exploring and not (isinstance(noise, str) and noise != "none")
-        self._known_noise = 0.0 if isinstance(noise, str) else float(noise)
+        self._straying = noise_while_exploring
         self._lattice = lattice
         rng = np.random.default_rng([self.seed, 0])
         self._design = initial_design(design, self.n_initial, box.dimension, rng)
@@ -264,9 +273,7 @@ class Optimizer:
         trials = np.concatenate([self._trials.commanded, self._trials.pending])
 
         def unused(place: int) -> bool:  # on a lattice several places may be one point
-            return np.count_nonzero(same(design[place], trials)) <= np.count_nonzero(
-                same(design[place], design[:place])
-            )
+            return int(same(design[place], trials).sum()) <= int(same(design[place], design[:place]).sum())
 
         return position if unused(position) else next(filter(unused, range(self.n_initial)), position)
 
@@ -386,16 +393,11 @@ class Optimizer:
         continues = self._strategy.continues_chains
         previous = self._cache[1] if continues and self._cache is not None else None
         rng = self._rng(1, t if continues else 0)  # else one stream for all: what some trials taught stays as it was
-        if self._straying and self.input_noise is not None:
+        if self._straying and self.input_noise is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self.input_noise.unit_roots(self.box, self._trials.commanded).copy()
             roots[self._trials.reported] = 0.0
             posterior = condition_on_noisy_inputs(
-                cast("NoisySurrogate", self._surrogate),
-                self._trials.reached,
-                self._trials.modelled,
-                roots,
-                self._known_noise,
-                [self.seed, 1, 0],
+                self._surrogate, self._trials.reached, self._trials.modelled, roots, [self.seed, 1, 0]
             )
         else:
             posterior = self._surrogate.condition(self._trials.reached, self._trials.modelled, rng, previous)

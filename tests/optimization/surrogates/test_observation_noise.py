@@ -5,8 +5,11 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.local_global import LocalGlobalProcess
+from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
 
 def growing(X):
@@ -126,3 +129,104 @@ def test_bad_noise_setting():
         GaussianProcess(noise="heteroskedastic")
     with pytest.raises(InputError, match="standard deviation"):
         GaussianProcess(noise=[0.1, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("surrogate", "noisy", "known"),
+    [
+        (GaussianProcess(), False, 0.0),
+        (GaussianProcess(noise=0.0), False, 0.0),
+        (GaussianProcess(noise=0.2), True, 0.2),
+        (GaussianProcess(noise="inferred"), True, None),
+        (GaussianProcess(noise="heteroscedastic"), True, None),
+        (TreedGaussianProcess(), False, 0.0),
+        (TreedGaussianProcess(process=GaussianProcess(noise="inferred")), True, None),
+    ],
+)
+def test_a_surrogate_answers_for_its_noise(surrogate, noisy, known):
+    assert surrogate.noisy is noisy
+    assert surrogate.known_noise == known
+    assert LocalGlobalProcess().noisy is False
+
+
+def hill(x):
+    return float(np.exp(-0.5 * ((x[0] - 0.6) / 0.15) ** 2))
+
+
+def told(**settings):
+    """Return an optimizer of 25 trials of a hill of height 1 with observation noise 0.3."""
+    rng = np.random.default_rng(1)
+    optimizer = Optimizer(Box.unit(1), seed=1, **settings)
+    for _ in range(25):
+        x = optimizer.ask()
+        optimizer.tell(x, hill(x) + 0.3 * rng.standard_normal())
+    return optimizer
+
+
+def test_an_object_with_inferred_noise_acts_as_the_named_surrogate():
+    named, given = told(noise="inferred"), told(surrogate=GaussianProcess(noise="inferred"))
+    assert np.array_equal(named.X, given.X)
+    assert np.array_equal(named.recommend().x, given.recommend().x)
+    highest = given.X[np.argmax(given.y)]
+    assert hill(given.recommend().x) > hill(highest) + 0.05, "the highest noisy value is no answer"
+
+
+class Plain:
+    """A surrogate of a user who knows nothing of `noisy`."""
+
+    def __init__(self):
+        self._process = GaussianProcess()
+
+    def condition(self, X, y, rng, previous=None):
+        return self._process.condition(X, y, rng, previous)
+
+
+def test_an_object_that_says_nothing_takes_observations_for_exact():
+    plain, exact = told(surrogate=Plain()), told()
+    assert np.array_equal(plain.X, exact.X)
+    assert plain.recommend().observed == plain.y.max()
+    with pytest.raises(InputError, match="noise_while_exploring needs"):
+        Optimizer(Box.unit(1), surrogate=Plain(), input_noise=InputNoise.unit(0.1), noise_while_exploring=True)
+
+
+OWNERS = [
+    {"surrogate": GaussianProcess()},
+    {"surrogate": TreedGaussianProcess()},
+    {"surrogate": Plain()},
+    {"preset": "thesis"},
+    {"preset": "thesis-gm", "surrogate": "tgp"},
+    {"preset": "thesis", "surrogate": GaussianProcess()},
+]
+
+
+@pytest.mark.parametrize("owner", OWNERS)
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ({"noise": "inferred"}, r"noise='inferred'.*leave one"),
+        ({"noise": "none"}, r"noise='none'.*leave one"),
+        ({"noise": 0.1}, r"noise=0.1.*leave one"),
+        ({"output_range": (0.0, 1.0)}, r"output_range=\(0.0, 1.0\).*leave one"),
+        ({"noise": "bogus"}, "'bogus' is unknown"),
+        ({"noise": -1.0}, "standard deviation"),
+        ({"output_range": (1.0, 0.0)}, "lower one first"),
+    ],
+)
+def test_settings_beside_their_owner_are_refused(owner, setting, words):
+    with pytest.raises(InputError, match=words):
+        Optimizer(Box.unit(2), **owner, **setting)
+    Optimizer(Box.unit(2), **owner, noise=None, output_range=None)  # not given
+
+
+@pytest.mark.parametrize("surrogate", ["gp", "tgp", "local_global"])
+@pytest.mark.parametrize("input_noise", [None, InputNoise.unit(0.1)])
+@pytest.mark.parametrize("noise", ["bogus", -0.1, np.nan, True, [0.1]])
+def test_bogus_noise_is_refused_beside_every_name(surrogate, input_noise, noise):
+    with pytest.raises(InputError, match="observation noise"):
+        Optimizer(Box.unit(2), surrogate=surrogate, input_noise=input_noise, noise=noise)
+
+
+@pytest.mark.parametrize("noise", ["inferred", 0.1])
+def test_a_surrogate_without_noise_refuses_it(noise):
+    with pytest.raises(InputError, match="exact observations"):
+        Optimizer(Box.unit(2), surrogate="local_global", noise=noise)

@@ -14,16 +14,14 @@ algorithm 3). The samples follow the density however poor the approximation; a g
 proposal, so that a step costs one or two evaluations where coordinate-wise sampling takes four for every coordinate.
 """
 
-from functools import cache
 from math import cos, log, pi, sin, sqrt
 from typing import Any, Final
 
 import numpy as np
-from numba import njit, typeof, types
+from numba import njit, types
 from numpy.typing import NDArray
 
-from surehold.optimization.samplers.slice import SliceSamples
-from surehold.optimization.surrogates.gaussian_process.likelihood import EVIDENCE_TYPE, Evidence
+from surehold.optimization.samplers.slice import SliceSamples, compiled_for
 
 __all__ = ["elliptical_slice_sample"]
 
@@ -85,20 +83,9 @@ def _sample(density, evidence, center, root, burn_in, thin, states, log_densitie
     return evaluations
 
 
-@cache
-def _compiled() -> Any:
-    # One compiled sampler, cached on disk, serves every density: see slice_sampling.
-    density = types.FunctionType(types.float64(types.float64[::1], EVIDENCE_TYPE))
-    generator = typeof(np.random.default_rng(0))
-    vector, matrix, count = types.float64[::1], types.float64[:, ::1], types.int64
-    _sample.compile((density, EVIDENCE_TYPE, vector, matrix, count, count, matrix, vector, generator))
-    _sample.disable_compile()
-    return _sample
-
-
 def elliptical_slice_sample(
     density: Any,
-    evidence: Evidence,
+    evidence: Any,
     center: NDArray[np.float64],
     root: NDArray[np.float64],
     rng: np.random.Generator,
@@ -112,7 +99,9 @@ def elliptical_slice_sample(
     Parameters
     ----------
     density
-        Compiled function (theta (p,), evidence) -> log density; -inf outside the support.
+        Compiled function (theta (p,), evidence) -> log density, of one signature; -inf outside the support.
+    evidence
+        What the density depends on besides, of the type of its second argument.
     center : (p,)
         About the density's mode; its density must be finite.
     root : (p, p)
@@ -120,7 +109,8 @@ def elliptical_slice_sample(
     """
     states = np.empty((keep, center.size))
     log_densities = np.empty(keep)
-    evaluations = _compiled()(
+    vector, matrix, count = types.float64[::1], types.float64[:, ::1], types.int64
+    evaluations = compiled_for(_sample, density, vector, matrix, count, count, matrix, vector)(
         density,
         evidence,
         np.array(center, dtype=np.float64),

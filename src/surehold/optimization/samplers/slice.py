@@ -15,9 +15,7 @@ import numpy as np
 from numba import njit, typeof, types
 from numpy.typing import NDArray
 
-from surehold.optimization.surrogates.gaussian_process.likelihood import EVIDENCE_TYPE, Evidence
-
-__all__ = ["SliceSamples", "slice_sample"]
+__all__ = ["SliceSamples", "compiled_for", "slice_sample"]
 
 
 class SliceSamples(NamedTuple):
@@ -85,21 +83,27 @@ def _sample(density, evidence, theta, widths, burn_in, thin, states, log_densiti
     return evaluations
 
 
+def compiled_for(sampler: Any, density: Any, *arguments: Any) -> Any:
+    """Return `sampler` compiled for densities with the signature of `density` and further `arguments` (types).
+
+    The density is passed as a first-class function of one signature, so that one compiled sampler, cached on disk,
+    serves every density; left to itself numba would compile the sampler again for each function it is given.
+    """
+    return _compiled(sampler, density.nopython_signatures[0], arguments)
+
+
 @cache
-def _compiled() -> Any:
-    # The density is a first-class function of one signature, so that one compiled sampler, cached on disk, serves
-    # every density; left to itself numba would compile the sampler again for each function it is given.
-    density = types.FunctionType(types.float64(types.float64[::1], EVIDENCE_TYPE))
+def _compiled(sampler: Any, signature: Any, arguments: tuple[Any, ...]) -> Any:
     generator = typeof(np.random.default_rng(0))
-    vector, count = types.float64[::1], types.int64
-    _sample.compile((density, EVIDENCE_TYPE, vector, vector, count, count, types.float64[:, ::1], vector, generator))
-    _sample.disable_compile()
-    return _sample
+    sampler.disable_compile(False)
+    sampler.compile((types.FunctionType(signature), signature.args[1], *arguments, generator))
+    sampler.disable_compile()
+    return sampler
 
 
 def slice_sample(
     density: Any,
-    evidence: Evidence,
+    evidence: Any,
     start: NDArray[np.float64],
     rng: np.random.Generator,
     *,
@@ -113,8 +117,10 @@ def slice_sample(
     Parameters
     ----------
     density
-        Compiled function (theta (p,), evidence) -> log density; -inf outside the support. A sweep updates every
-        coordinate once.
+        Compiled function (theta (p,), evidence) -> log density, of one signature; -inf outside the support. A sweep
+        updates every coordinate once.
+    evidence
+        What the density depends on besides, of the type of its second argument.
     start : (p,)
         First state; its density must be finite.
     widths
@@ -124,5 +130,7 @@ def slice_sample(
     log_densities = np.empty(keep)
     theta = np.array(start, dtype=np.float64)
     guesses = np.broadcast_to(np.asarray(widths, dtype=np.float64), theta.shape).copy()
-    evaluations = _compiled()(density, evidence, theta, guesses, burn_in, thin, states, log_densities, rng)
+    vector, count = types.float64[::1], types.int64
+    sampler = compiled_for(_sample, density, vector, vector, count, count, types.float64[:, ::1], vector)
+    evaluations = sampler(density, evidence, theta, guesses, burn_in, thin, states, log_densities, rng)
     return SliceSamples(states, log_densities, int(evaluations))

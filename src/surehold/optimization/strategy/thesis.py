@@ -6,7 +6,7 @@ history proposes other points than the run itself.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, Prior
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.protocol import Posterior
+from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, least_leaf_width
 
 __all__ = ["PRESETS", "ThesisConstants", "ThesisImprovement", "thesis_preset"]
 
@@ -46,6 +47,20 @@ class ThesisConstants(NamedTuple):
             prior=Prior(log_length_scale=(1.0, 10.0)),
             learning=Learning("slice", particles=10, burn_in=100, thin=1, width=6.0),
         )
+
+    def tree(self, input_deviations: NDArray[np.float64], seed: int = 0, **changes: Any) -> TreedGaussianProcess:
+        """Return the thesis' treed Gaussian process; arguments as of `surrogate_named`, `changes` of the tree."""
+        settings = {"min_leaf": self.min_leaf, "continued": True, **changes}
+        margin = least_leaf_width(input_deviations)
+        return TreedGaussianProcess(process=self.gaussian_process(), margin=margin, seed=seed, **settings)
+
+    def surrogate(
+        self, name: str, input_deviations: NDArray[np.float64], seed: int = 0
+    ) -> GaussianProcess | TreedGaussianProcess:
+        """Return the thesis' surrogate of that name, "gp" or "tgp"; raises InputError for another one."""
+        if name not in ("gp", "tgp"):
+            raise unknown_name("surrogate of a thesis preset", name, ("gp", "tgp"))
+        return self.gaussian_process() if name == "gp" else self.tree(input_deviations, seed)
 
 
 PRESETS: Final = {

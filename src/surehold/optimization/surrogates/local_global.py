@@ -21,9 +21,10 @@ import numpy as np
 from numba import njit, types
 from numpy.typing import NDArray
 
+from surehold.optimization.numerics.cholesky import cholesky, solve_lower
 from surehold.optimization.samplers.slice import SliceSamples, slice_sample
 from surehold.optimization.surrogates.gaussian_process.kernels import correlation_and_factor, self_correlation
-from surehold.optimization.surrogates.gaussian_process.likelihood import EVIDENCE_TYPE, cholesky, solve_lower
+from surehold.optimization.surrogates.gaussian_process.likelihood import EVIDENCE_TYPE
 from surehold.optimization.surrogates.gaussian_process.model import SURPRISE, GaussianProcess, fingerprint, learnt_from
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import surprise
@@ -283,6 +284,11 @@ class LocalGlobalProcess:
     def __init__(self, output_range: tuple[float, float] | None = None):
         self._stationary: Final = GaussianProcess(output_range=output_range)
         self._learnt: OrderedDict[bytes, tuple[Standardization, SliceSamples]] = OrderedDict()  # only saves time
+
+    @property
+    def noisy(self) -> bool:
+        """False: observations are exact."""
+        return False
 
     def condition(
         self,

@@ -2,30 +2,43 @@
 
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from surehold.errors import InputError, unknown_name
-from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.strategy.presets import TREED, TreedSettings
-from surehold.optimization.strategy.thesis import ThesisConstants
-from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, NoiseName
+from surehold.optimization.surrogates.gaussian_process.model import (
+    GaussianProcess,
+    NoiseName,
+    checked_noise_setting,
+)
+from surehold.optimization.surrogates.gaussian_process.outputs import checked_range
 from surehold.optimization.surrogates.local_global import LocalGlobalProcess
 from surehold.optimization.surrogates.protocol import Surrogate
+from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, least_leaf_width
 
-__all__ = ["SURROGATES", "surrogate_named"]
+__all__ = ["SURROGATES", "refuse_settings", "surrogate_named"]
 
 SURROGATES: Final = ("gp", "tgp", "local_global")
 
 
 def surrogate_named(
     name: str,
-    box: Box,
-    input_noise: InputNoise | None,
-    seed: int,
-    noise: float | NoiseName,
-    output_range: tuple[float, float] | None,
-    thesis: ThesisConstants | None,
+    *,
+    noise: float | NoiseName | None = None,
+    output_range: tuple[float, float] | None = None,
+    input_deviations: NDArray[np.float64],
+    seed: int = 0,
 ) -> Surrogate:
-    """Return the surrogate of that name; arguments as of `Optimizer`, `thesis` the constants of a preset.
+    """Return the surrogate of that name.
+
+    Parameters
+    ----------
+    noise, output_range
+        As of `GaussianProcess`; None where not given: exact observations, an unknown range.
+    input_deviations : (d,)
+        Standard deviations of the input noise in the unit cube, 0 for exact variables; no leaf of a tree is narrower.
+    seed
+        Of the chains in the leaves of a tree.
 
     Raises
     ------
@@ -34,15 +47,31 @@ def surrogate_named(
     """
     if name not in SURROGATES:
         raise unknown_name("surrogate", name, SURROGATES)
+    setting = checked_noise_setting("none" if noise is None else noise)
     if name == "local_global":
-        if thesis is not None or noise not in ("none", 0.0):
+        if setting not in ("none", 0.0):
             raise InputError(
-                "surrogate 'local_global' has no preset and takes exact observations; leave preset= and noise= out, "
-                "or choose 'gp' or 'tgp'."
+                f"noise is {noise!r}, but the surrogate 'local_global' takes exact observations; leave noise= out, or "
+                "choose 'gp' or 'tgp'."
             )
         return LocalGlobalProcess(output_range)
-    process = GaussianProcess(noise=noise, output_range=output_range) if thesis is None else thesis.gaussian_process()
+    process = GaussianProcess(noise=setting, output_range=output_range)
     if name == "gp":
         return process
-    tree = TREED if thesis is None else TreedSettings(thesis.min_leaf, continued=True)
-    return tree.surrogate(process, box, input_noise, seed)
+    return TreedGaussianProcess(process=process, margin=least_leaf_width(input_deviations), seed=seed)
+
+
+def refuse_settings(owner: str, noise: float | NoiseName | None, output_range: tuple[float, float] | None) -> None:
+    """Refuse settings of the surrogate beside an `owner` that has its own, so that none is dropped without a word.
+
+    Raises
+    ------
+    InputError
+        If `noise` or `output_range` is given (not None).
+    """
+    if noise is not None:
+        checked_noise_setting(noise)
+        raise InputError(f"noise={noise!r} is given beside {owner}, which has its own; leave one out.")
+    if output_range is not None:
+        checked_range(output_range)
+        raise InputError(f"output_range={output_range!r} is given beside {owner}, which has its own; leave one out.")

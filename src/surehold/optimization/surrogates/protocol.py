@@ -6,14 +6,23 @@ Legend
     s   points of a quadrature of the input noise: offsets (s, d), weights (s,) that sum to 1
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 _LARGEST = 1e150  # the square of a larger number is infinite
 
-__all__ = ["FitDiagnostics", "Moments", "PartitionSummary", "Posterior", "Regions", "Surrogate", "mixture"]
+__all__ = [
+    "FitDiagnostics",
+    "Moments",
+    "NoisySurrogate",
+    "PartitionSummary",
+    "Posterior",
+    "Regions",
+    "Surrogate",
+    "mixture",
+]
 
 
 class Moments(NamedTuple):
@@ -118,7 +127,15 @@ class Posterior(Protocol):
 
 
 class Surrogate(Protocol):
-    """A distribution over functions before any trial."""
+    """A distribution over functions before any trial, and what it takes observations for."""
+
+    @property
+    def noisy(self) -> bool:
+        """Whether observations carry noise, so that the highest one is not taken for the best.
+
+        An object without this attribute takes observations for exact.
+        """
+        ...
 
     def condition(
         self,
@@ -128,6 +145,27 @@ class Surrogate(Protocol):
         previous: Posterior | None = None,
     ) -> Posterior:
         """Learn the hyperparameters from inputs X (n, d) in the unit cube and outputs y (n,)."""
+        ...
+
+
+@runtime_checkable
+class NoisySurrogate(Surrogate, Protocol):
+    """A surrogate that takes a standard deviation of the observation noise for every single trial."""
+
+    @property
+    def known_noise(self) -> float | None:
+        """Standard deviation of the observation noise of its settings, 0 for none; None where it is learnt."""
+        ...
+
+    def condition(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        rng: np.random.Generator,
+        previous: Posterior | None = None,
+        noise: NDArray[np.float64] | None = None,
+    ) -> Posterior:
+        """Learn from X (n, d), y (n,) and known standard deviations of the observations (n,)."""
         ...
 
 

@@ -28,6 +28,7 @@ import numpy as np
 from numba import njit
 
 from surehold.errors import unknown_name
+from surehold.optimization.numerics.exponential import exponential
 
 __all__ = [
     "KERNELS",
@@ -53,46 +54,20 @@ def kernel_number(name: str) -> int:
     return KERNELS.index(name)
 
 
-@njit(cache=True, inline="always")
-def _exponential(x):
-    """Return exp(x) for x in [-700, 0] to 2 units in the last place, in a form that compilers turn into SIMD code.
-
-    exp(x) = 2^k exp(t) with |t| <= ln 2 / 2 (Cody and Waite 1980), exp(t) by its Taylor polynomial of degree 13; a call
-    of the C library's exp, one element at a time, takes three times as long.
-    """
-    k = np.floor(x * 1.4426950408889634 + 0.5)
-    t = (x - k * 0.693145751953125) - k * 1.4286068203094172e-06
-    p = 1.6059043836821613e-10
-    p = p * t + 2.08767569878681e-09
-    p = p * t + 2.505210838544172e-08
-    p = p * t + 2.755731922398589e-07
-    p = p * t + 2.7557319223985893e-06
-    p = p * t + 2.48015873015873e-05
-    p = p * t + 0.0001984126984126984
-    p = p * t + 0.001388888888888889
-    p = p * t + 0.008333333333333333
-    p = p * t + 0.041666666666666664
-    p = p * t + 0.16666666666666666
-    p = p * t + 0.5
-    p = p * t + 1.0
-    p = p * t + 1.0
-    return p * np.int64((np.int64(k) + np.int64(1023)) << np.int64(52)).view(np.float64)
-
-
 @njit(cache=True, fastmath={"contract"})
 def _transform(kernel, squared):
     """Overwrite squared scaled distances (n,) with correlations c."""
     if kernel == 0:
         for i in range(squared.size):
             r = min(_SQRT5 * sqrt(squared[i]), _FAR)
-            squared[i] = (1.0 + r + r * r / 3.0) * _exponential(-r)
+            squared[i] = (1.0 + r + r * r / 3.0) * exponential(-r)
     elif kernel == 1:
         for i in range(squared.size):
             r = min(_SQRT3 * sqrt(squared[i]), _FAR)
-            squared[i] = (1.0 + r) * _exponential(-r)
+            squared[i] = (1.0 + r) * exponential(-r)
     else:
         for i in range(squared.size):
-            squared[i] = _exponential(-min(0.5 * squared[i], _FAR))
+            squared[i] = exponential(-min(0.5 * squared[i], _FAR))
 
 
 @njit(cache=True, fastmath={"contract"})
@@ -101,18 +76,18 @@ def _transform_with_factor(kernel, squared, factor):
     if kernel == 0:
         for i in range(squared.size):
             r = min(_SQRT5 * sqrt(squared[i]), _FAR)
-            e = _exponential(-r)
+            e = exponential(-r)
             squared[i] = (1.0 + r + r * r / 3.0) * e
             factor[i] = 5.0 / 3.0 * (1.0 + r) * e
     elif kernel == 1:
         for i in range(squared.size):
             r = min(_SQRT3 * sqrt(squared[i]), _FAR)
-            e = _exponential(-r)
+            e = exponential(-r)
             squared[i] = (1.0 + r) * e
             factor[i] = 3.0 * e
     else:
         for i in range(squared.size):
-            e = _exponential(-min(0.5 * squared[i], _FAR))
+            e = exponential(-min(0.5 * squared[i], _FAR))
             squared[i] = e
             factor[i] = e
 
@@ -136,7 +111,7 @@ def _products(x, Z, inverse_l, out):
         scale = _SQRT5 * inverse_l[k]
         for j in range(out.size):
             r = min(abs(x[k] - Z[k, j]) * scale, _FAR)
-            out[j] *= (1.0 + r + r * r / 3.0) * _exponential(-r)
+            out[j] *= (1.0 + r + r * r / 3.0) * exponential(-r)
 
 
 @njit(cache=True, inline="always")

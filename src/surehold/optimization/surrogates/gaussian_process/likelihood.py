@@ -17,23 +17,17 @@ Legend (the thesis' symbols in brackets)
     log posterior       = sum_b w_b log p(y_b | X_b, theta) + log prior(theta),  prior: independent normals on theta
 """
 
-from math import exp, inf, log, pi, sqrt
+from math import exp, inf, log, pi
 from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit, types
 from numpy.typing import NDArray
 
+from surehold.optimization.numerics.cholesky import cholesky, invert_lower, solve_lower
 from surehold.optimization.surrogates.gaussian_process.kernels import along, correlation_and_factor, self_correlation
 
-__all__ = [
-    "Evidence",
-    "cholesky",
-    "log_posterior",
-    "log_posterior_and_gradient",
-    "solve_lower",
-    "solve_lower_transposed",
-]
+__all__ = ["EVIDENCE_TYPE", "Evidence", "log_posterior", "log_posterior_and_gradient"]
 
 _LOG_2PI: Final = log(2.0 * pi)
 _LARGEST: Final = 60.0  # |theta| beyond this is outside every useful scale and would overflow
@@ -97,107 +91,6 @@ EVIDENCE_TYPE: Final = types.NamedTuple(
     ),
     Evidence,
 )
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def cholesky(A):
-    """Overwrite the lower triangle of A (n, n) with its Cholesky factor; False if A is not positive definite.
-
-    Two columns at a time and four rows below them together: six loads from memory serve eight sums, where entry by
-    entry every sum would read both of its rows anew.
-    """
-    n = A.shape[0]
-    for j in range(0, n - 1, 2):
-        u, v = A[j], A[j + 1]
-        uu = uv = vv = 0.0
-        for k in range(j):
-            uu += u[k] * u[k]
-            uv += u[k] * v[k]
-            vv += v[k] * v[k]
-        pivot = u[j] - uu
-        if not pivot > 0.0:
-            return False
-        u[j] = sqrt(pivot)
-        first = 1.0 / u[j]
-        v[j] = (v[j] - uv) * first
-        between = v[j]
-        pivot = v[j + 1] - vv - between * between
-        if not pivot > 0.0:
-            return False
-        v[j + 1] = sqrt(pivot)
-        second = 1.0 / v[j + 1]
-        i = j + 2
-        while i + 4 <= n:
-            a, b, c, d = A[i], A[i + 1], A[i + 2], A[i + 3]
-            au = bu = cu = du = av = bv = cv = dv = 0.0
-            for k in range(j):
-                au += a[k] * u[k]
-                bu += b[k] * u[k]
-                cu += c[k] * u[k]
-                du += d[k] * u[k]
-                av += a[k] * v[k]
-                bv += b[k] * v[k]
-                cv += c[k] * v[k]
-                dv += d[k] * v[k]
-            a[j], b[j], c[j], d[j] = (a[j] - au) * first, (b[j] - bu) * first, (c[j] - cu) * first, (d[j] - du) * first
-            a[j + 1] = (a[j + 1] - av - a[j] * between) * second
-            b[j + 1] = (b[j + 1] - bv - b[j] * between) * second
-            c[j + 1] = (c[j + 1] - cv - c[j] * between) * second
-            d[j + 1] = (d[j + 1] - dv - d[j] * between) * second
-            i += 4
-        for row in range(i, n):
-            a = A[row]
-            au = av = 0.0
-            for k in range(j):
-                au += a[k] * u[k]
-                av += a[k] * v[k]
-            a[j] = (a[j] - au) * first
-            a[j + 1] = (a[j + 1] - av - a[j] * between) * second
-    if n % 2 == 1:
-        last = A[n - 1]
-        total = 0.0
-        for k in range(n - 1):
-            total += last[k] * last[k]
-        pivot = last[n - 1] - total
-        if not pivot > 0.0:
-            return False
-        last[n - 1] = sqrt(pivot)
-    return True
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def solve_lower(L, b):
-    """Overwrite b (n,) with L^-1 b."""
-    for i in range(b.size):
-        t = 0.0
-        for k in range(i):
-            t += L[i, k] * b[k]
-        b[i] = (b[i] - t) / L[i, i]
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def solve_lower_transposed(L, b):
-    """Overwrite b (n,) with L'^-1 b."""
-    for i in range(b.size - 1, -1, -1):
-        b[i] /= L[i, i]
-        t = b[i]
-        for k in range(i):
-            b[k] -= L[i, k] * t
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def invert_lower(L, inverse):
-    """Fill `inverse` (n, n) with the inverse of the lower triangular L (n, n), row by row from the rows above."""
-    inverse[:] = 0.0
-    for i in range(L.shape[0]):
-        diagonal = 1.0 / L[i, i]
-        row = inverse[i]
-        for k in range(i):
-            t = L[i, k] * diagonal
-            above = inverse[k]
-            for j in range(k + 1):
-                row[j] -= t * above[j]
-        row[i] = diagonal
 
 
 @njit(cache=True)

@@ -101,12 +101,7 @@ class GaussianProcess:
     ):
         self._kernel = kernel_number(kernel)
         self._signal_variance = None if signal_variance is None else _positive("signal_variance", signal_variance)
-        if isinstance(noise, str):
-            if noise not in NOISES:
-                raise unknown_name("observation noise", noise, (*NOISES, "a standard deviation"))
-        elif not (np.ndim(noise) == 0 and np.isfinite(noise) and noise >= 0.0):
-            raise InputError(f"observation noise is {noise!r}; give a finite standard deviation of 0 or more.")
-        self._noise = noise
+        self._noise = checked_noise_setting(noise)
         self._ratio = float(ratio)
         if not 0.0 <= self._ratio < 1.0:
             raise InputError(f"ratio is {ratio!r}; the nugget is a fraction of the signal variance, in [0, 1).")
@@ -122,6 +117,18 @@ class GaussianProcess:
             raise InputError(f"length_scales are {length_scales!r}; give positive finite numbers, one a dimension.")
         self._posterior: GaussianProcessPosterior | None = None
         self._learnt: OrderedDict[bytes, tuple[Standardization, Learnt]] = OrderedDict()  # saves time, changes nothing
+
+    @property
+    def known_noise(self) -> float | None:
+        """Standard deviation of the observation noise, in the outputs' units, 0 for none; None where it is learnt."""
+        if isinstance(self._noise, str):
+            return 0.0 if self._noise == "none" else None
+        return self._noise
+
+    @property
+    def noisy(self) -> bool:
+        """Whether observations carry noise."""
+        return self.known_noise != 0.0
 
     def condition(
         self,
@@ -334,6 +341,18 @@ def checked_data(
         if not np.all(np.isfinite(values)):
             raise InputError(f"{name} holds NaN or infinity; remove those observations first.")
     return inputs, outputs
+
+
+def checked_noise_setting(noise: float | NoiseName) -> float | NoiseName:
+    """Return a setting of the observation noise; raises InputError where it is neither a name nor a deviation."""
+    if isinstance(noise, str):
+        if noise not in NOISES:
+            raise unknown_name("observation noise", noise, (*NOISES, "a standard deviation"))
+        return noise
+    number = isinstance(noise, (int, float, np.integer, np.floating)) and not isinstance(noise, bool)
+    if not (number and np.isfinite(noise) and noise >= 0.0):
+        raise InputError(f"observation noise is {noise!r}; give a finite standard deviation of 0 or more.")
+    return float(noise)
 
 
 def checked_noise(noise: ArrayLike, n: int) -> NDArray[np.float64]:

@@ -16,19 +16,14 @@ is f(x) itself, so one compiled function serves both.
 import numpy as np
 from numba import njit
 
+from surehold.optimization.numerics.cholesky import cholesky, invert_lower, solve_lower, solve_lower_transposed
 from surehold.optimization.surrogates.gaussian_process.kernels import (
     along,
     correlation_and_factor,
     cross_correlation,
     transposed,
 )
-from surehold.optimization.surrogates.gaussian_process.likelihood import (
-    cholesky,
-    data_covariance,
-    invert_lower,
-    solve_lower,
-    solve_lower_transposed,
-)
+from surehold.optimization.surrogates.gaussian_process.likelihood import data_covariance
 
 __all__ = ["average", "factorize", "sample"]
 

@@ -27,11 +27,12 @@ from surehold.optimization.surrogates.protocol import Posterior, mixture
 from surehold.optimization.surrogates.treed.partition import Partition, grow
 from surehold.optimization.surrogates.treed.posterior import AveragedTrees, TreedPosterior
 
-__all__ = ["TreedGaussianProcess"]
+__all__ = ["TreedGaussianProcess", "least_leaf_width"]
 
 _REMEMBERED: Final = 4096  # leaves whose learning is kept
 _SIZES: Final = (8, 10, 15, 20, 30, 50)  # smallest leaves among which the evidence chooses
 _UNDIVIDED: Final = 300  # trials up to which no split at all is among the choices: its cost grows with their cube
+_WIDEST: Final = 0.49  # a margin of half of the box leaves no place for a split
 _NARROWEST: Final = 0.01  # thesis: no split nearer to the border of a leaf's box than this
 
 
@@ -101,6 +102,16 @@ class TreedGaussianProcess:
         self._posterior: TreedPosterior | AveragedTrees | None = None
         self._learnt: OrderedDict[bytes, GaussianProcessPosterior] = OrderedDict()
         self._evidences: OrderedDict[bytes, float] = OrderedDict()
+
+    @property
+    def known_noise(self) -> float | None:
+        """Standard deviation of the observation noise, in the outputs' units, 0 for none; None where it is learnt."""
+        return self._process.known_noise
+
+    @property
+    def noisy(self) -> bool:
+        """Whether observations carry noise."""
+        return self._process.noisy
 
     def condition(
         self,
@@ -271,6 +282,14 @@ class TreedGaussianProcess:
         """Return the standard deviation of the observation noise (q,) at X (q, d): what is known of it, or learnt."""
         queries, _ = checked_data(X, None, self.posterior.regions.lower.shape[1])
         return np.sqrt(self.posterior.noise_variance(queries))
+
+
+def least_leaf_width(deviations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the margin (d,) under an input noise of standard deviations (d,) in the unit cube, 0 for exact variables.
+
+    No leaf is narrower than the noise's standard deviation, or than 0.01 box widths where there is none.
+    """
+    return np.where(deviations > 0.0, np.minimum(deviations, _WIDEST), _NARROWEST)
 
 
 def _count(name: str, value: int, least: int) -> int:
