@@ -4,10 +4,15 @@ Behind each value stands the command that measured it, or the honest words "neve
 the whole rather than this value against others, it says so. Tolerances that only guard against overflow and rounding
 stay in the module that needs them.
 
+Three more stand beside the compiled functions that use them, because Numba's cache notices changes of that file only:
+`_WIDE` and `_NARROW` of `surrogates.local_global`, the widths of its two parts in box widths, and `_NU` of
+`samplers.elliptical_slice`, the degrees of freedom of its proposals. None of them was measured against other values.
+
 "Box widths" are widths of the unit cube, in which the optimizer works; "particles" are the equally likely settings of
 the surrogate's hyperparameters.
 """
 
+from math import log
 from typing import Final
 
 # --- initial design ---------------------------------------------------------------------------------------------------
@@ -117,6 +122,70 @@ ASCENT_PRECISION: Final = 1e-8
 #: factorization are good to about 1e-12. Never measured.
 DIFFERENCE_STEP: Final = 1e-4
 
+# --- surrogates: Gaussian process -------------------------------------------------------------------------------------
+
+#: Prior of a length-scale: its median is 0.2 sqrt(d) box widths, with this standard deviation of the logarithm. The
+#: factor sqrt(d) keeps the correlation of two random points the same for any number of variables. Never measured on its
+#: own; the whole: python -m benchmarks.best_observed.
+LENGTH_SCALE_MEDIAN: Final = 0.2
+LENGTH_SCALE_DEVIATION: Final = 1.0
+#: Mean and standard deviation of the logarithms of signal and noise variance, in squared standard deviations of the
+#: outputs; the noise is 0.1 of these in the median. Never measured.
+SIGNAL_VARIANCE_PRIOR: Final = (0.0, 1.5)
+NOISE_VARIANCE_PRIOR: Final = (log(1e-2), 3.0)
+#: Nugget, as a fraction of the signal variance: small, for observations are exact unless `noise` says otherwise.
+#: Never measured.
+NUGGET: Final = 1e-10
+#: Particles; sweeps before the first one and from one to the next. The chain starts at the mode and moves by the
+#: curvature there, so that few sweeps are enough. Time: python -m benchmarks.suggestion_time. Effect on the result:
+#: never measured.
+PARTICLES: Final = 10
+BURN_IN: Final = 4
+THIN: Final = 2
+#: First guess of a slice's width of the coordinate-wise sampler, in logarithms: the thesis'. Never measured.
+SLICE_WIDTH: Final = 6.0
+#: Common length-scales at which the search for the mode may start, and how far it may go, in standard deviations of the
+#: prior. Never measured.
+MODE_STARTS: Final = (-2.0, -1.0, 0.0, 1.0)
+MODE_REACH: Final = 6.0
+#: Where L-BFGS-B ends: the mode guides a sampler, and within 1e-3 of the top is enough. Never measured.
+MODE_TOLERANCES: Final = {"maxiter": 50, "ftol": 1e-5, "gtol": 1e-2}
+#: Step of the differences of gradients that give the curvature at the mode, in logarithms. Never measured.
+CURVATURE_STEP: Final = 0.05
+#: Hyperparameters are learnt again when the trials have grown by 1/16 of their number, or when a later trial misses its
+#: prediction by so many standard deviations. Time: python -m benchmarks.suggestion_time. Effect on the result: never
+#: measured.
+RELEARNT_DIVISOR: Final = 16
+SURPRISE: Final = 4.0
+#: Observation noise that varies: median length-scale of its logarithm over sqrt(d) box widths, standard deviation of
+#: that in logarithms, prior of its variance; rounds, the change of the logarithm that ends them, and the largest step
+#: at one observation. Never measured.
+VARYING_NOISE_LENGTH_SCALE: Final = 0.5
+VARYING_NOISE_LENGTH_SCALE_DEVIATION: Final = 0.7
+VARYING_NOISE_VARIANCE_PRIOR: Final = (0.0, 1.0)
+VARYING_NOISE_STEPS: Final = 20
+VARYING_NOISE_CONVERGED: Final = 0.02
+VARYING_NOISE_LONGEST_STEP: Final = 2.0
+#: Rounds of learning and taking slopes where trials stray under the input noise; they settle in two. Never measured.
+SLOPE_ROUNDS: Final = 3
+
+# --- surrogates: tree and mixture -------------------------------------------------------------------------------------
+
+#: Smallest number of trials in a leaf of the tree. The thesis has 8 to 20, by problem.
+#: surehold campaign run partition-rule
+MIN_LEAF: Final = 15
+#: No split lies nearer to the border of a leaf's box than this, in box widths (the thesis), or than the input noise's
+#: standard deviation, of which no more than 0.49 counts: half of the box would leave no place for a split. Never
+#: measured.
+LEAF_MARGIN: Final = 0.01
+WIDEST_LEAF_MARGIN: Final = 0.49
+#: Smallest leaves among which the evidence chooses, and trials up to which no split at all is a choice: its cost grows
+#: with their cube. surehold campaign run partition-rule
+LEAF_SIZES: Final = (8, 10, 15, 20, 30, 50)
+UNDIVIDED: Final = 300
+#: Sweeps before the first particle of the local-global process, whose chain starts at no mode. Never measured.
+LOCAL_GLOBAL_BURN_IN: Final = 5
+
 # --- the trust region, an option --------------------------------------------------------------------------------------
 
 #: First, largest and smallest side of the box, in box widths; successes and failures in a row after which it doubles or
@@ -131,11 +200,11 @@ TRUST_IMPROVEMENT: Final = 1e-3
 
 # --- the thesis presets -----------------------------------------------------------------------------------------------
 
-#: Evaluations of DIRECT for each variable, and the share of them left to a polish along the gradient: the original
-#: program's, of its section on the maximization of the criterion.
+#: Evaluations of DIRECT for each variable, and the divisor that gives those of the polish along the gradient, which the
+#: thesis does not describe: as in the original program. Never measured.
 THESIS_EVALUATIONS: Final = 500
-THESIS_POLISH_SHARE: Final = 10
-#: Starts around the incumbent, and their standard deviation in box widths: the original program's.
+THESIS_POLISH_DIVISOR: Final = 10
+#: Starts around the incumbent, and their standard deviation in box widths: as in the original program. Never measured.
 THESIS_LOCAL_TRIALS: Final = 5
 THESIS_LOCAL_SCALE: Final = 0.05
 #: How often a trial may be repeated where observations are exact. The original repeats a point twenty times before it

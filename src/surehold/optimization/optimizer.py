@@ -55,12 +55,12 @@ class Optimizer:
         `surrogates.protocol.Surrogate`. An object says by its attribute `noisy` whether observations carry noise;
         without that attribute they are taken for exact.
     criterion
-        "ei", "log_ei", "pi", "ucb"; with input noise also "uei", "ulog_ei", "upi", "uucb" (the criterion averaged over
-        sigma points) and "robust_ei", ... (the criterion of the averaged outcome); "thompson" and "robust_thompson"
-        (the maximum of a function, or of its outcome, drawn from the posterior). By default "log_ei" without and
+        "ei", "log_ei", "pi", "ucb"; with input noise also "uei" and "ulog_ei" (the criterion averaged over sigma
+        points) and "robust_ei", ... (the criterion of the averaged outcome); "thompson" and "robust_thompson" (the
+        maximum of a function, or of its outcome, drawn from the posterior). By default "log_ei" without and
         "robust_log_ei" with input noise; in the thesis presets "ei" and "uei".
     n_initial
-        Trials of the initial design; by default 5 a variable, at least 6.
+        Trials of the initial design; by default 5 for each variable, at least 6.
     design
         "latin_hypercube" (default), "sobol" or "uniform".
     seed
@@ -75,7 +75,8 @@ class Optimizer:
     quadrature
         How the input noise is averaged over: "unscented" (default of the criteria averaged over sigma points),
         "scaled_unscented", "central_difference", "gauss_hermite" or "quasi_monte_carlo" (default of the robust ones);
-        "closed_form" for a GaussianProcess with the squared-exponential kernel.
+        "closed_form" for a GaussianProcess with the squared-exponential kernel. The risk measures "mean-std", "var" and
+        "cvar" take a rule without negative weights.
     k
         Free parameter of the unscented transformation.
     border
@@ -98,7 +99,8 @@ class Optimizer:
         (after TuRBO): an option for six variables and more; off by default.
     preset
         "thesis", or "thesis-rkhs", "thesis-gf", "thesis-gm", "thesis-gm-printed", "thesis-gm-noise", "thesis-grasp":
-        the settings of the thesis, with the constants that it chose by hand for that problem.
+        the settings of the thesis, with the constants that it chose by hand for that problem. It chooses trials in a
+        way of its own, so that `risk`, `trust_region` and the Thompson criteria cannot be combined with it.
     lattice
         Which points can be tried, where not all of the box can; see `lattice.Lattice`.
 

@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from surehold.defaults import THESIS_EVALUATIONS, THESIS_LOCAL_SCALE, THESIS_LOCAL_TRIALS, THESIS_POLISH_SHARE
+from surehold.defaults import THESIS_EVALUATIONS, THESIS_LOCAL_SCALE, THESIS_LOCAL_TRIALS, THESIS_POLISH_DIVISOR
 from surehold.optimization.maximizer.ascent import Objective, climb
 from surehold.optimization.surrogates.protocol import Regions
 
@@ -191,7 +191,7 @@ def divide_and_climb(
     """
     lower, upper = regions or Regions.whole(dimension)
     budget = THESIS_EVALUATIONS * dimension
-    polish = budget // THESIS_POLISH_SHARE
+    polish = budget // THESIS_POLISH_DIVISOR
     found = divide_rectangles(objective, lower, upper, budget - polish)
     around = incumbent + THESIS_LOCAL_SCALE * rng.standard_normal((THESIS_LOCAL_TRIALS, dimension))
     starts = np.concatenate([found, np.clip(around, 0.0, 1.0)])
