@@ -67,7 +67,7 @@ class Acquisition:
     perturbations
         Quadrature of the input noise; a single zero offset where the scale is "exact".
     best
-        Value of the incumbent on the scale of the criterion: a number, or (m, 1) for one a particle.
+        Value of the incumbent on the scale of the criterion: a number, or (m, 1) for one per particle.
     margin
         Improvement that does not count, in the outputs' units.
     kappa
