@@ -103,7 +103,7 @@ class Ranking:
         return self.order(posterior, history.tried)
 
     def incumbent(self, posterior: Posterior, history: History, scale: Scale) -> tuple[Any, NDArray[np.float64]]:
-        """Return the value to improve upon, a number or (m, 1) for one per particle, and the best tried inputs (a, d)."""
+        """Return the value to improve upon, a number or (m, 1), one per particle; and the best tried inputs (a, d)."""
         if scale == "exact":
             values = self._values(posterior, history)
             return float(values.max()), history.tried[np.argsort(-values, kind="stable")[:ANCHORS]]
