@@ -17,7 +17,7 @@ from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise, root_of
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.strategy.presets import thesis_preset
+from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.named import SURROGATES
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, least_leaf_width

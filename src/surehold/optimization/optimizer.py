@@ -10,9 +10,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.defaults import DESIGN_LEAST, DESIGN_PER_VARIABLE, KAPPA, OUTCOME_EXPONENT
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
-from surehold.optimization.acquisition.scales import criterion_name
 from surehold.optimization.box import Box
 from surehold.optimization.lattice import Lattice, LatticePosterior
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
@@ -21,9 +21,12 @@ from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.recommendation import Recommendation, recommendation
-from surehold.optimization.strategy.goal import Goal
 from surehold.optimization.strategy.initial_design import design as initial_design
-from surehold.optimization.strategy.presets import thesis_preset
+from surehold.optimization.strategy.named import strategy_named
+from surehold.optimization.strategy.promise import promise
+from surehold.optimization.strategy.ranking import History, Ranking
+from surehold.optimization.strategy.thesis import thesis_preset
+from surehold.optimization.strategy.trust_region import TrustRegion
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.surrogates.named import refuse_settings, surrogate_named
 from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
@@ -31,10 +34,6 @@ from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior,
 from surehold.optimization.trials import Trials, same
 
 __all__ = ["Optimizer"]
-
-# How often an exact trial may be repeated in the thesis presets. The original repeats a point twenty times before it
-# jumps to a random one, which cost it whole runs.
-_THESIS_REPEATS: Final = 2
 
 
 class Optimizer:
@@ -56,12 +55,12 @@ class Optimizer:
         `surrogates.protocol.Surrogate`. An object says by its attribute `noisy` whether observations carry noise;
         without that attribute they are taken for exact.
     criterion
-        "ei", "log_ei", "pi", "ucb"; with input noise also "uei", "ulog_ei", "upi", "uucb" (the criterion averaged over
-        sigma points) and "robust_ei", ... (the criterion of the averaged outcome); "thompson" and "robust_thompson"
-        (the maximum of a function, or of its outcome, drawn from the posterior). By default "log_ei" without and
+        "ei", "log_ei", "pi", "ucb"; with input noise also "uei" and "ulog_ei" (the criterion averaged over sigma
+        points) and "robust_ei", ... (the criterion of the averaged outcome); "thompson" and "robust_thompson" (the
+        maximum of a function, or of its outcome, drawn from the posterior). By default "log_ei" without and
         "robust_log_ei" with input noise; in the thesis presets "ei" and "uei".
     n_initial
-        Trials of the initial design; by default 5 a variable, at least 6.
+        Trials of the initial design; by default 5 for each variable, at least 6.
     design
         "latin_hypercube" (default), "sobol" or "uniform".
     seed
@@ -76,7 +75,8 @@ class Optimizer:
     quadrature
         How the input noise is averaged over: "unscented" (default of the criteria averaged over sigma points),
         "scaled_unscented", "central_difference", "gauss_hermite" or "quasi_monte_carlo" (default of the robust ones);
-        "closed_form" for a GaussianProcess with the squared-exponential kernel.
+        "closed_form" for a GaussianProcess with the squared-exponential kernel. The risk measures "mean-std", "var" and
+        "cvar" take a rule without negative weights.
     k
         Free parameter of the unscented transformation.
     border
@@ -99,7 +99,8 @@ class Optimizer:
         (after TuRBO): an option for six variables and more; off by default.
     preset
         "thesis", or "thesis-rkhs", "thesis-gf", "thesis-gm", "thesis-gm-printed", "thesis-gm-noise", "thesis-grasp":
-        the settings of the thesis, with the constants that it chose by hand for that problem.
+        the settings of the thesis, with the constants that it chose by hand for that problem. It chooses trials in a
+        way of its own, so that `risk`, `trust_region` and the Thompson criteria cannot be combined with it.
     lattice
         Which points can be tried, where not all of the box can; see `lattice.Lattice`.
 
@@ -124,7 +125,7 @@ class Optimizer:
         quadrature: str | None = None,
         k: float = 1.0,
         border: str = "extend",
-        kappa: float = 2.0,
+        kappa: float = KAPPA,
         risk: str | Risk = "mean",
         noise_while_exploring: bool = False,
         trust_region: bool = False,
@@ -151,30 +152,20 @@ class Optimizer:
             self._surrogate = surrogate_named(
                 surrogate, noise=noise, output_range=output_range, input_deviations=deviations, seed=self.seed
             )
-        if criterion is None:
-            criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + (input_noise is not None)]
-        name = criterion_name(criterion)
-        if not np.isfinite(kappa):
-            raise InputError(f"kappa is {kappa!r}; give a finite number of standard deviations.")
-        risk = Risk(risk) if isinstance(risk, str) else risk
-        if input_noise is None and (name.scale != "exact" or risk.name != "mean"):
-            what = f"risk '{risk.name}'" if risk.name != "mean" else f"criterion '{criterion}'"
-            raise InputError(f"{what} needs input noise; give input_noise=.")
         if input_noise is not None:
             input_noise.warn_if_larger_than(box)
-        many = name.scale == "robust" or risk.name != "mean"
-        rule = quadrature or ("quasi_monte_carlo" if many else "unscented")
-        self._goal = Goal(
-            criterion=name,
-            accurate=Perturbations.of(input_noise, box, rule, border, k=k),
-            coarse=Perturbations.of(input_noise, box, "unscented", border),
-            risk=risk,
-            margin=0.0 if thesis is None else thesis.margin,
-            kappa=float(kappa),
+        self._strategy = strategy_named(
+            criterion,
+            Risk(risk) if isinstance(risk, str) else risk,
+            box,
+            input_noise,
+            quadrature=quadrature,
+            k=k,
+            border=border,
+            kappa=kappa,
             noisy=getattr(self._surrogate, "noisy", False) or noise_while_exploring,
-            trust_region=trust_region,
-            n_initial=self.n_initial,
-            thesis=thesis is not None,
+            trust_region=TrustRegion(self.n_initial) if trust_region else None,
+            thesis=thesis,
         )
         takes_noise = isinstance(self._surrogate, NoisySurrogate)
         if noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
@@ -191,8 +182,8 @@ class Optimizer:
 
     @staticmethod
     def default_n_initial(box: Box) -> int:
-        """Return the size of the initial design where none is given: 5 a variable, at least 6."""
-        return max(6, 5 * box.dimension)
+        """Return the size of the initial design where none is given: 5 for each variable, at least 6."""
+        return max(DESIGN_LEAST, DESIGN_PER_VARIABLE * box.dimension)
 
     # --- trials -------------------------------------------------------------------------------------------------
 
@@ -263,12 +254,12 @@ class Optimizer:
         """
         first = len(self._trials) + len(self._trials.pending) if number is None else _count("number", number, 0)
         if n is None:
-            return self._ask_one(first)
-        return np.array([self._ask_one(first + i) for i in range(_count("n", n, 1))])
+            return self._ask_one(first, number is None)
+        return np.array([self._ask_one(first + i, number is None) for i in range(_count("n", n, 1))])
 
-    def _ask_one(self, position: int) -> NDArray[np.float64]:
+    def _ask_one(self, position: int, by_count: bool) -> NDArray[np.float64]:
         if position < self.n_initial:
-            u = self._design[position]
+            u = self._design[self._unused_place(position) if by_count else position]
         elif not self._trials.successful.any():
             u = self._rng(2, position).random(self.box.dimension)  # every trial failed or is pending: keep covering
         else:
@@ -278,23 +269,23 @@ class Optimizer:
         self._trials.ask(u)
         return self.box.from_unit(u)
 
+    def _unused_place(self, position: int) -> int:
+        """Return the place in the design to ask for next: the position, or the first unused one after a `forget`."""
+        design = self._snapped(self._design)
+        trials = np.concatenate([self._trials.commanded, self._trials.pending])
+
+        def unused(place: int) -> bool:  # on a lattice several places may be one point
+            return int(same(design[place], trials).sum()) <= int(same(design[place], design[:place]).sum())
+
+        return position if unused(position) else next(filter(unused, range(self.n_initial)), position)
+
     def _propose(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        told, pending = self._trials.successful, self._trials.pending
-        candidates = self._goal.candidates(
-            self._posterior(),
-            self._trials.reached[told],
-            self._trials.modelled[told],
-            pending,
-            self._trials.reached[~told],
-            rng,
-        )
-        candidates = self._snapped(candidates)
-        if self._goal.noisy:
+        candidates = self._snapped(self._strategy.candidates(self._posterior(), self._history, rng))
+        if self._ranking.noisy:
             return candidates[0]
-        repeats = _THESIS_REPEATS if self._goal.thesis else 0
-        tried = np.concatenate([self._trials.commanded, pending])
-        for candidate in candidates[:1] if self._goal.thesis else candidates:
-            if np.count_nonzero(same(candidate, tried)) <= repeats:
+        tried = np.concatenate([self._trials.commanded, self._trials.pending])
+        for candidate in candidates:
+            if np.count_nonzero(same(candidate, tried)) <= self._strategy.repeats:
                 return candidate
         return rng.random(self.box.dimension)  # every candidate has been tried already
 
@@ -315,27 +306,28 @@ class Optimizer:
         """
         if where not in ("observed", "box"):
             raise unknown_name("place of the recommendation", where, ("observed", "box"))
-        told = self._trials.successful
-        tried, values = self._trials.reached[told], self._trials.values[told]
+        history, ranking = self._history, self._ranking
         with single_threaded():
             posterior = self._posterior()
             if where == "observed":
-                index = int(self._goal.rank(posterior, tried, values)[0])
-                u, observed = tried[index], float(values[index])
+                index = int(ranking.order(posterior, history.tried, history.observed)[0])
+                u, observed = history.tried[index], float(history.observed[index])
             else:
-                u, observed = self._snapped(self._goal.best(posterior, tried, self._rng(3, len(self._trials)))), np.nan
-            border = self._goal.accurate.border
-            reached = Perturbations.of(self.input_noise, self.box, "quasi_monte_carlo", border, exponent=7)
-            highest = int(np.argmax(values))
+                rng = self._rng(3, len(self._trials))
+                u, observed = self._snapped(ranking.best(posterior, history.tried, rng)), np.nan
+            reached = Perturbations.of(
+                self.input_noise, self.box, "quasi_monte_carlo", ranking.accurate.border, exponent=OUTCOME_EXPONENT
+            )
+            highest = int(np.argmax(history.observed))
             return recommendation(
                 posterior,
                 reached,
-                self._goal.coarse,
+                ranking.coarse,
                 u,
                 self.box.from_unit(u),
                 observed,
-                (tried[highest], float(values[highest])),
-                len(values),
+                (history.tried[highest], float(self._trials.values[self._trials.successful][highest])),
+                len(history.observed),
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
                 self._execution_noise(),
             )
@@ -346,7 +338,7 @@ class Optimizer:
         With `under_noise`, of the outcome averaged over the input noise instead.
         """
         U = np.atleast_2d(self.box.to_unit(X))
-        perturbations = self._goal.accurate if under_noise else Perturbations(exact(self.box.dimension))
+        perturbations = self._ranking.accurate if under_noise else Perturbations(exact(self.box.dimension))
         with single_threaded():
             mean, variance = mixture(perturbations.outcome(self._posterior(), U))
         return mean, np.sqrt(variance)
@@ -357,12 +349,8 @@ class Optimizer:
         Of the outcome under the input noise, over the best input tried so far; small where there is little left to
         find. Raises InputError if no trial has given a value yet.
         """
-        told = self._trials.successful
         with single_threaded():
-            posterior = self._posterior()
-            return self._goal.promise(
-                posterior, self._trials.reached[told], self._trials.modelled[told], self._rng(4, len(self._trials))
-            )
+            return promise(self._ranking, self._posterior(), self._history, self._rng(4, len(self._trials)))
 
     def estimate_input_noise(self) -> InputNoise:
         """Return the input noise that the trials told so far show.
@@ -389,15 +377,26 @@ class Optimizer:
 
     # --- inside -------------------------------------------------------------------------------------------------
 
+    @property
+    def _ranking(self) -> Ranking:
+        return self._strategy.ranking
+
+    @property
+    def _history(self) -> History:
+        told = self._trials.successful
+        return History(
+            self._trials.reached[told], self._trials.modelled[told], self._trials.reached[~told], self._trials.pending
+        )
+
     def _posterior(self) -> Posterior:
         t = len(self._trials)
         if not self._trials.successful.any():
             raise InputError("no trial has given a value yet; tell the outcome of at least one.")
         if self._cache is not None and self._cache[0] == t:
             return self._cache[1]
-        previous = self._cache[1] if self._goal.thesis and self._cache is not None else None
-        stream = t if self._goal.thesis else 0  # one stream for all: what was learnt from some trials stays as it was
-        rng = self._rng(1, stream)
+        continues = self._strategy.continues_chains
+        previous = self._cache[1] if continues and self._cache is not None else None
+        rng = self._rng(1, t if continues else 0)  # else one stream for all: what some trials taught stays as it was
         if self._straying and self.input_noise is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self.input_noise.unit_roots(self.box, self._trials.commanded).copy()
             roots[self._trials.reported] = 0.0

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import QUASI_RANDOM_EXPONENT
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
@@ -55,7 +56,7 @@ class Perturbations:
         border: str = "extend",
         *,
         k: float = 1.0,
-        exponent: int = 5,
+        exponent: int = QUASI_RANDOM_EXPONENT,
     ) -> "Perturbations":
         """Return the perturbations of an input noise by a quadrature rule; None is no noise."""
         if noise is None:

@@ -16,6 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.defaults import QUASI_RANDOM_EXPONENT
 from surehold.errors import InputError, unknown_name
 
 __all__ = [
@@ -43,7 +44,7 @@ class Quadrature(NamedTuple):
 
 
 def quadrature(
-    name: str, covariance: ArrayLike, k: float = 1.0, *, bounded: bool = False, exponent: int = 5
+    name: str, covariance: ArrayLike, k: float = 1.0, *, bounded: bool = False, exponent: int = QUASI_RANDOM_EXPONENT
 ) -> Quadrature:
     """Return the rule of that name for N(0, covariance).
 
@@ -162,7 +163,9 @@ def gauss_hermite(covariance: ArrayLike, order: int = 3, bounded: bool = False) 
     return Quadrature(offsets, product / product.sum())
 
 
-def quasi_monte_carlo(covariance: ArrayLike, exponent: int = 5, bounded: bool = False) -> Quadrature:
+def quasi_monte_carlo(
+    covariance: ArrayLike, exponent: int = QUASI_RANDOM_EXPONENT, bounded: bool = False
+) -> Quadrature:
     """Return 2**exponent equally weighted quasi-random points of N(0, covariance): a shifted Sobol sequence.
 
     Of uniform noise with that covariance where it is `bounded`.

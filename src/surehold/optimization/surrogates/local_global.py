@@ -21,11 +21,12 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from surehold.defaults import LOCAL_GLOBAL_BURN_IN, NUGGET, PARTICLES, SURPRISE
 from surehold.optimization.numerics.cholesky import cholesky, solve_lower
 from surehold.optimization.samplers.slice import SliceSamples, slice_sample
 from surehold.optimization.surrogates.gaussian_process.kernels import correlation_and_factor, self_correlation
 from surehold.optimization.surrogates.gaussian_process.likelihood import EVIDENCE_TYPE
-from surehold.optimization.surrogates.gaussian_process.model import SURPRISE, GaussianProcess, fingerprint, learnt_from
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, fingerprint, learnt_from
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import surprise
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
@@ -36,9 +37,6 @@ __all__ = ["LocalGlobalProcess"]
 _WIDE: Final = 10.0
 _NARROW: Final = 0.05
 _MATERN52: Final = 0
-_NUGGET: Final = 1e-10
-_PARTICLES: Final = 10
-_BURN_IN: Final = 5
 _REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
 _LARGEST: Final = 60.0
 
@@ -344,7 +342,9 @@ class LocalGlobalProcess:
         theta = plain.hyperparameters.theta[0]
         start = np.concatenate([theta[:d], theta[:d] - log(4.0), theta[d : d + 1], X[int(np.argmax(y))]])
         widths = np.append(np.full(2 * d + 1, 1.0), np.full(d, 0.2))
-        samples = slice_sample(log_posterior, evidence, start, rng, keep=_PARTICLES, burn_in=_BURN_IN, widths=widths)
+        samples = slice_sample(
+            log_posterior, evidence, start, rng, keep=PARTICLES, burn_in=LOCAL_GLOBAL_BURN_IN, widths=widths
+        )
         return plain.outputs, samples
 
 
@@ -372,4 +372,4 @@ def _factorized(
 
 
 def _nuggets() -> Iterator[float]:
-    return iter([_NUGGET, *(10.0**e for e in range(-9, -1))])
+    return iter([NUGGET, *(10.0**e for e in range(-9, -1))])

@@ -9,16 +9,13 @@ To first order y = f(x + xi) = f(x) + slope' xi: a trial that strayed looks like
 variance slope' S slope, large where the function is steep (McHutchon and Rasmussen 2011, equation 5).
 """
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import SLOPE_ROUNDS
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior
 
 __all__ = ["condition_on_noisy_inputs"]
-
-_ROUNDS: Final = 3  # of learning and taking slopes; they settle in two
 
 
 def condition_on_noisy_inputs(
@@ -48,7 +45,7 @@ def condition_on_noisy_inputs(
     size = np.sqrt(np.square(roots).sum(axis=(1, 2)))
     noise = np.hypot(known, spread * np.minimum(2.0 * size, 1.0))  # before slopes are known: those of half the box
     posterior = surrogate.condition(X, y, np.random.default_rng(seed), None, noise)
-    for _ in range(_ROUNDS - 1):
+    for _ in range(SLOPE_ROUNDS - 1):
         slopes = np.asarray(posterior.moments(X, gradient=True).mean_gradient).mean(axis=0)  # (n, d)
         noise = np.sqrt(known**2 + np.square(np.einsum("nde,nd->ne", roots, slopes)).sum(axis=1))
         posterior = surrogate.condition(X, y, np.random.default_rng(seed), None, noise)

@@ -17,6 +17,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import (
+    NOISE_VARIANCE_PRIOR,
+    VARYING_NOISE_CONVERGED,
+    VARYING_NOISE_LENGTH_SCALE,
+    VARYING_NOISE_LENGTH_SCALE_DEVIATION,
+    VARYING_NOISE_LONGEST_STEP,
+    VARYING_NOISE_STEPS,
+    VARYING_NOISE_VARIANCE_PRIOR,
+)
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Prior, mode
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
@@ -24,9 +33,6 @@ from surehold.optimization.surrogates.gaussian_process.posterior import Gaussian
 
 __all__ = ["most_likely_noise"]
 
-_STEPS: Final = 20
-_CONVERGED: Final = 0.02  # largest change of log r
-_LONGEST_STEP: Final = 2.0  # of log r at one observation
 _PLAIN: Final = Standardization(0.0, 1.0, False)
 
 
@@ -37,7 +43,9 @@ def most_likely_noise(evidence: Evidence) -> tuple[NDArray[np.float64], Gaussian
     """
     X, y = evidence.X, evidence.y
     n, d = X.shape
-    prior_mean, prior_deviation = Prior((log(0.5 * sqrt(d)), 0.7), (0.0, 1.0)).vectors(d, True, False)
+    prior_mean, prior_deviation = Prior(
+        (log(VARYING_NOISE_LENGTH_SCALE * sqrt(d)), VARYING_NOISE_LENGTH_SCALE_DEVIATION), VARYING_NOISE_VARIANCE_PRIOR
+    ).vectors(d, True, False)
     levels = Evidence(
         X=X,
         y=np.zeros(n),
@@ -59,12 +67,12 @@ def most_likely_noise(evidence: Evidence) -> tuple[NDArray[np.float64], Gaussian
         f = _at_mode(evidence._replace(noise=np.exp(g))).moments(X)
         s = (y - f.mean[0]) ** 2 + f.variance[0]
         level = g.mean()
-        working = g - level + np.minimum(s * np.exp(-g) - 1.0, _LONGEST_STEP)
+        working = g - level + np.minimum(s * np.exp(-g) - 1.0, VARYING_NOISE_LONGEST_STEP)
         posterior = _at_mode(levels._replace(y=working), Standardization(level, 1.0, False))
         change = posterior.moments(X).mean[0] - g
         g = g + change
         steps += 1
-        if np.abs(change).max() < _CONVERGED or steps == _STEPS:
+        if np.abs(change).max() < VARYING_NOISE_CONVERGED or steps == VARYING_NOISE_STEPS:
             return np.exp(g), posterior
 
 
@@ -72,8 +80,8 @@ def _common_level(evidence: Evidence) -> float:
     """Return the log of the noise variance that all observations have in common, at the mode."""
     common = evidence._replace(
         noise=np.zeros(len(evidence.y)),
-        prior_mean=np.append(evidence.prior_mean, log(0.01)),
-        prior_deviation=np.append(evidence.prior_deviation, 3.0),
+        prior_mean=np.append(evidence.prior_mean, NOISE_VARIANCE_PRIOR[0]),
+        prior_deviation=np.append(evidence.prior_deviation, NOISE_VARIANCE_PRIOR[1]),
         learn_noise=True,
     )
     return float(mode(common)[0][-1])

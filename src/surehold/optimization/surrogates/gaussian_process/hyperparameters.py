@@ -5,12 +5,23 @@ Legend: theta (p,) = log length-scales (d), then log signal variance and log noi
 """
 
 from dataclasses import dataclass, fields
-from math import log
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import (
+    BURN_IN,
+    CURVATURE_STEP,
+    MODE_REACH,
+    MODE_STARTS,
+    MODE_TOLERANCES,
+    NOISE_VARIANCE_PRIOR,
+    PARTICLES,
+    SIGNAL_VARIANCE_PRIOR,
+    SLICE_WIDTH,
+    THIN,
+)
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.samplers.elliptical_slice import elliptical_slice_sample
 from surehold.optimization.samplers.slice import slice_sample
@@ -22,11 +33,7 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import (
 
 __all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "mode"]
 
-_STARTS = (-2.0, -1.0, 0.0, 1.0)  # common length-scale of the mode's first guesses, in prior standard deviations
-_CURVATURE_STEP = 0.05
-_NEAR = {"maxiter": 50, "ftol": 1e-5, "gtol": 1e-2}  # the mode guides a sampler: within 1e-3 of the top is enough
 _METHODS = ("elliptical_slice", "slice", "map")
-_REACH = 6.0  # the mode is sought within this many prior standard deviations
 
 
 @dataclass(frozen=True)
@@ -35,9 +42,9 @@ class Prior:
 
     log_length_scale: tuple[float, float]
     """mean and standard deviation; length-scales in widths of the unit cube"""
-    log_signal_variance: tuple[float, float] = (0.0, 1.5)
+    log_signal_variance: tuple[float, float] = SIGNAL_VARIANCE_PRIOR
     """in squared standard deviations of the outputs"""
-    log_noise_variance: tuple[float, float] = (log(1e-2), 3.0)
+    log_noise_variance: tuple[float, float] = NOISE_VARIANCE_PRIOR
     """in squared standard deviations of the outputs"""
 
     def __post_init__(self) -> None:
@@ -68,10 +75,10 @@ class Learning:
     """
 
     method: Literal["elliptical_slice", "slice", "map"] = "elliptical_slice"
-    particles: int = 10
-    burn_in: int = 4
-    thin: int = 2
-    width: float = 6.0
+    particles: int = PARTICLES
+    burn_in: int = BURN_IN
+    thin: int = THIN
+    width: float = SLICE_WIDTH
 
     def __post_init__(self) -> None:
         if self.method not in _METHODS:
@@ -120,8 +127,8 @@ def _root_of_covariance(evidence: Evidence, center: NDArray[np.float64]) -> NDAr
     precision = np.empty((p, p))
     for i in range(p):
         step = np.zeros(p)
-        step[i] = _CURVATURE_STEP
-        precision[i] = (level - log_posterior_and_gradient(center + step, evidence)[1]) / _CURVATURE_STEP
+        step[i] = CURVATURE_STEP
+        precision[i] = (level - log_posterior_and_gradient(center + step, evidence)[1]) / CURVATURE_STEP
     deviation = evidence.prior_deviation
     scaled = 0.5 * (precision + precision.T) * np.outer(deviation, deviation)
     if not np.all(np.isfinite(scaled)):
@@ -146,8 +153,8 @@ def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
 
     d = evidence.X.shape[1]
     mean, deviation = evidence.prior_mean, evidence.prior_deviation
-    starts = np.repeat(mean[None, :], len(_STARTS), axis=0)
-    starts[:, :d] += np.outer(_STARTS, deviation[:d])
+    starts = np.repeat(mean[None, :], len(MODE_STARTS), axis=0)
+    starts[:, :d] += np.outer(MODE_STARTS, deviation[:d])
     values = [log_posterior(start, evidence) for start in starts]
     best = int(np.argmax(values))
 
@@ -155,7 +162,7 @@ def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
         value, gradient = log_posterior_and_gradient(theta, evidence)
         return (1e25, gradient) if value == -np.inf else (-value, -gradient)
 
-    bounds = list(zip(mean - _REACH * deviation, mean + _REACH * deviation, strict=True))
-    found = minimize(negative, starts[best], jac=True, method="L-BFGS-B", bounds=bounds, options=_NEAR)
+    bounds = list(zip(mean - MODE_REACH * deviation, mean + MODE_REACH * deviation, strict=True))
+    found = minimize(negative, starts[best], jac=True, method="L-BFGS-B", bounds=bounds, options=MODE_TOLERANCES)
     theta = found.x if -found.fun > values[best] else starts[best]
     return np.ascontiguousarray(theta), len(starts) + int(found.nfev)

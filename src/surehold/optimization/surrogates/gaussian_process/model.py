@@ -12,6 +12,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.defaults import LENGTH_SCALE_DEVIATION, LENGTH_SCALE_MEDIAN, NUGGET, RELEARNT_DIVISOR, SURPRISE
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.surrogates.gaussian_process.heteroscedastic import most_likely_noise
@@ -34,7 +35,6 @@ __all__ = ["NOISES", "GaussianProcess", "NoiseName"]
 NoiseName = Literal["none", "inferred", "heteroscedastic"]
 NOISES: Final = get_args(NoiseName)
 _REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
-SURPRISE: Final = 4.0  # standard deviations by which a trial may miss its prediction before all is learnt anew
 _LOUDEST: Final = 1e100  # standard deviation of the noise, in those of the outputs; its square stays finite
 
 
@@ -91,7 +91,7 @@ class GaussianProcess:
         kernel: str = "matern52",
         signal_variance: float | None = None,
         noise: float | NoiseName = "none",
-        ratio: float = 1e-10,
+        ratio: float = NUGGET,
         standardize: bool = True,
         output_range: tuple[float, float] | None = None,
         mean_variance: float = 0.0,
@@ -263,7 +263,7 @@ class GaussianProcess:
             raise InputError(f"length_scales have shape {self._length_scales.shape}; the inputs need ({d},).")
         known = noise if noise is not None else np.full(len(y), 0.0 if isinstance(self._noise, str) else self._noise)
         learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred" and noise is None
-        prior = self._prior or Prior((log(0.2 * sqrt(d)), 1.0))
+        prior = self._prior or Prior((log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION))
         prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise)
         return Evidence(
             np.ascontiguousarray(X, dtype=np.float64),
@@ -375,7 +375,7 @@ def _positive(name: str, value: float) -> float:
 
 def learnt_from(n: int) -> int:
     """Return k: of n trials, the first k are those that hyperparameters are learnt from; n - n/16 < k <= n."""
-    return n - n % (1 << max(0, n.bit_length() - 5))
+    return n - n % (1 << max(0, n.bit_length() - RELEARNT_DIVISOR.bit_length()))
 
 
 def fingerprint(X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, *others) -> bytes:

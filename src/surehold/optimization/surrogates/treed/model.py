@@ -13,6 +13,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.defaults import LEAF_MARGIN, LEAF_SIZES, MIN_LEAF, UNDIVIDED, WIDEST_LEAF_MARGIN
 from surehold.errors import InputError
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.surrogates.gaussian_process.model import (
@@ -30,10 +31,6 @@ from surehold.optimization.surrogates.treed.posterior import AveragedTrees, Tree
 __all__ = ["TreedGaussianProcess", "least_leaf_width"]
 
 _REMEMBERED: Final = 4096  # leaves whose learning is kept
-_SIZES: Final = (8, 10, 15, 20, 30, 50)  # smallest leaves among which the evidence chooses
-_UNDIVIDED: Final = 300  # trials up to which no split at all is among the choices: its cost grows with their cube
-_WIDEST: Final = 0.49  # a margin of half of the box leaves no place for a split
-_NARROWEST: Final = 0.01  # thesis: no split nearer to the border of a leaf's box than this
 
 
 class TreedGaussianProcess:
@@ -77,12 +74,12 @@ class TreedGaussianProcess:
 
     def __init__(
         self,
-        min_leaf: int | Literal["evidence"] = 15,
+        min_leaf: int | Literal["evidence"] = MIN_LEAF,
         weight_power: float = inf,
         *,
         process: GaussianProcess | None = None,
         trees: int = 1,
-        margin: ArrayLike = _NARROWEST,
+        margin: ArrayLike = LEAF_MARGIN,
         continued: bool = False,
         seed: int = 0,
     ):
@@ -151,7 +148,7 @@ class TreedGaussianProcess:
         standardized = outputs.apply(y)
         if not isinstance(self._min_leaf, str):
             return grow(X, standardized, self._min_leaf, margin, weights)
-        sizes = [*_SIZES, len(y) + 1] if len(y) <= _UNDIVIDED else _SIZES
+        sizes = [*LEAF_SIZES, len(y) + 1] if len(y) <= UNDIVIDED else LEAF_SIZES
         partitions = [grow(X, standardized, size, margin, weights) for size in sizes]
         values = [self._log_evidence(partition, X, y, noise, outputs.coarse()) for partition in partitions]
         return partitions[int(np.argmax(values))]
@@ -289,7 +286,7 @@ def least_leaf_width(deviations: NDArray[np.float64]) -> NDArray[np.float64]:
 
     No leaf is narrower than the noise's standard deviation, or than 0.01 box widths where there is none.
     """
-    return np.where(deviations > 0.0, np.minimum(deviations, _WIDEST), _NARROWEST)
+    return np.where(deviations > 0.0, np.minimum(deviations, WIDEST_LEAF_MARGIN), LEAF_MARGIN)
 
 
 def _count(name: str, value: int, least: int) -> int:
