@@ -1,4 +1,5 @@
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -29,6 +30,13 @@ def stopped(x):
     calls += 1
     if calls == 9:
         os.kill(os.getpid(), signal.SIGINT)
+    return float(-x[0])
+
+def terminated(x):
+    global calls
+    calls += 1
+    if calls == 9:
+        os.kill(os.getpid(), signal.SIGTERM)
     return float(-x[0])
 
 def stopped_at_once(x):
@@ -157,6 +165,35 @@ def test_interrupt_keeps_what_was_done(here, capsys):
     assert "was interrupted after 8" in (folder / "report.html").read_text(encoding="utf-8")
 
 
+def test_sigterm_keeps_what_was_done(here):
+    line = "maximize own.py:terminated --bounds a=0:1 --trials 30 --initial 6"
+    done = subprocess.run(
+        [sys.executable, "-m", "surehold", *line.split()], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    data = json.loads((here / "runs" / "terminated-ubo-seed0" / "result.json").read_text())
+    assert data["interrupted"]
+    assert len(data["trials"]["y"]) == 8
+
+
+def test_another_run_gets_another_folder(here, capsys):
+    line = "maximize own.py:hill --bounds a=0:1 --trials 8 --initial 6 --method bo --noise none"
+    assert surehold(line) == 0
+    before = (here / "runs" / "hill-bo-seed0" / "result.json").read_bytes()
+    assert surehold(line.replace("a=0:1", "a=0:2")) == 0
+    assert surehold(line) == 0
+    assert "runs/hill-bo-seed0-3/report.html" in capsys.readouterr().out
+    assert (here / "runs" / "hill-bo-seed0" / "result.json").read_bytes() == before
+    assert (here / "runs" / "hill-bo-seed0-2" / "result.json").read_bytes() != before
+    assert (here / "runs" / "hill-bo-seed0-3" / "result.json").read_bytes() == before
+
+
+def test_a_run_that_gave_nothing_leaves_no_empty_folder(here, capsys):
+    assert surehold("maximize own.py:hopeless --bounds a=0:1 --trials 6") != 0
+    assert not list((here / "runs").iterdir())
+    capsys.readouterr()
+
+
 @pytest.mark.usefixtures("interruptible")
 def test_interrupt_before_anything(capsys):
     assert surehold("maximize own.py:stopped_at_once --bounds a=0:1") == 130
@@ -222,3 +259,23 @@ def test_a_closed_pipe_does_not_end_the_run(here):
         assert process.stderr.read() == ""
     assert process.returncode == 0
     assert (here / "piped" / "report.html").is_file()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+def test_a_full_output_does_not_end_the_run(here):
+    line = [sys.executable, "-m", "surehold", "maximize", "gf", "--trials", "22", "--out", "full"]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert "the output cannot be written (No space left on device)" in done.stderr
+    assert done.returncode == 0
+    assert (here / "full" / "report.html").is_file()
+
+
+def test_output_in_ascii(here):
+    line = [sys.executable, "-m", "surehold", "maximize", "gf", "--trials", "22", "--out", "plain"]
+    done = subprocess.run(line, capture_output=True, env={**os.environ, "PYTHONIOENCODING": "ascii"}, check=False)
+    assert done.returncode == 0, done.stderr
+    text = done.stdout.decode("ascii")
+    assert "+/-" in text
+    assert (here / "plain" / "report.html").is_file()

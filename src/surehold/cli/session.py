@@ -5,7 +5,7 @@ import re
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from surehold.cli.compilation import announced, warm_up
-from surehold.cli.interruption import undisturbed
+from surehold.cli.interruption import terminable, undisturbed
 from surehold.cli.terminal import terminal
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.maximization import Result, Trial, maximize
@@ -48,13 +48,18 @@ class Kept:
 
 
 def folder_for(name: str, method: str, seed: int, out: str, study: str = "") -> Path:
-    """Return the folder for a run's files, created and writable: `out`, runs/STUDY, or runs/NAME-METHOD-seedN."""
+    """Return the folder for a run's files, created and writable: `out`, runs/STUDY, or a new one in runs/.
+
+    A new one is called NAME-METHOD-seedN, with -2, -3, ... behind it where that is taken: no run replaces another.
+    """
     if study and not out:
         from surehold.studies.storage import checked_name
 
         return files.checked_folder(Path("runs") / checked_name(study))
-    slug = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "run"
-    return files.checked_folder(out or Path("runs") / f"{slug}-{method}-seed{seed}")
+    if out:
+        return files.checked_folder(out)
+    slug = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower()[:100] or "run"
+    return files.new_folder(Path("runs") / f"{slug}-{method}-seed{seed}")
 
 
 def run_session(
@@ -78,7 +83,7 @@ def run_session(
     kept: Kept | None = None,
     console: Console | None = None,
 ) -> RunReport:
-    """Maximize, score, write and show; Ctrl-C keeps what was done.
+    """Maximize, score, write and show; Ctrl-C and SIGTERM keep what was done.
 
     A run that is kept as a study is resumed where that exists.
 
@@ -94,66 +99,81 @@ def run_session(
         If Ctrl-C comes before any trial has given a value.
     """
     console = console or terminal()
-    for name, count in (("trials", trials), ("initial", initial)):
-        if count < 1:
-            raise InputError(f"--{name} is {count}; give 1 or more.")
-    if initial > trials:
-        raise InputError(
-            f"--initial is {initial}, but --trials is {trials}; give at least as many trials as initial ones."
-        )
-    options: dict[str, Any] = {
-        "input_noise": noise if method == "ubo" else None,
-        "n_initial": initial,
-        "seed": seed,
-        "preset": preset or None,
-    }
-    if noise is not None:
-        noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
-    console.print(f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), method {method}, seed {seed}")
     started = time.perf_counter()
-    with announced(console):
-        warm_up(problem, options)
-    if kept is None or not kept.study:
-        result = _with_progress(problem, trials, options, console)
-    else:
-        result = _as_study(kept, problem, trials, options, units or {}, console)
-    if result.interrupted:
-        console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
-    notes = _failures(result)
-    scores: dict[tuple[str, int], RobustScore | None] = {}
-    for label, index in gather.answers(result).items():
-        scores[label, index] = None
+    with terminable(), _new_folder_removed_on_error(folder):
+        for name, count in (("trials", trials), ("initial", initial)):
+            if count < 1:
+                raise InputError(f"--{name} is {count}; give 1 or more.")
+        if initial > trials:
+            raise InputError(
+                f"--initial is {initial}, but --trials is {trials}; give at least as many trials as initial ones."
+            )
+        options: dict[str, Any] = {
+            "input_noise": noise if method == "ubo" else None,
+            "n_initial": initial,
+            "seed": seed,
+            "preset": preset or None,
+        }
         if noise is not None:
-            try:
-                scores[label, index] = robust_score(problem, result.X[index], noise, n=REQUERIES, seed=seed)
-            except KeyboardInterrupt:
-                notes = [*notes, f"The re-queries of the {label} point were interrupted and left out."]
-    with undisturbed(console):
-        report = gather.report_of(
-            result,
-            [describe(gather.candidate(result, label, i, score)) for (label, i), score in scores.items()],
-            title=title,
-            settings={
-                **settings,
-                "method": method,
-                "trials": trials,
-                "initial trials": initial,
-                "preset": preset or None,
-                "study": kept.study if kept and kept.study else None,
-            },
-            noise=noise,
-            units=units,
-            quality_name=quality_name,
-            disturbance=disturbance,
-            planned_trials=trials,
-            notes=notes,
+            noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
+        console.print(
+            f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), method {method}, seed {seed}"
         )
-        path = files.write_run(report, folder)
-        also_write(report, folder)
+        with announced(console):
+            warm_up(problem, options)
+        if kept is None or not kept.study:
+            result = _with_progress(problem, trials, options, console)
+        else:
+            result = _as_study(kept, problem, trials, options, units or {}, console)
+        if result.interrupted:
+            console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
+        notes = _failures(result)
+        scores: dict[tuple[str, int], RobustScore | None] = {}
+        for label, index in gather.answers(result).items():
+            scores[label, index] = None
+            if noise is not None:
+                try:
+                    scores[label, index] = robust_score(problem, result.X[index], noise, n=REQUERIES, seed=seed)
+                except KeyboardInterrupt:
+                    notes = [*notes, f"The re-queries of the {label} point were interrupted and left out."]
+        with undisturbed(console):
+            report = gather.report_of(
+                result,
+                [describe(gather.candidate(result, label, i, score)) for (label, i), score in scores.items()],
+                title=title,
+                settings={
+                    **settings,
+                    "method": method,
+                    "trials": trials,
+                    "initial trials": initial,
+                    "preset": preset or None,
+                    "study": kept.study if kept and kept.study else None,
+                },
+                noise=noise,
+                units=units,
+                quality_name=quality_name,
+                disturbance=disturbance,
+                planned_trials=trials,
+                notes=notes,
+            )
+            path = files.write_run(report, folder)
+            also_write(report, folder)
     _show(report, path, time.perf_counter() - started, console)
     if open_report:
         webbrowser.open(path.resolve().as_uri())
     return report
+
+
+@contextmanager
+def _new_folder_removed_on_error(folder: Path) -> Iterator[None]:
+    """Remove the run's folder in runs/ where the block fails before anything was written into it."""
+    try:
+        yield
+    except BaseException:
+        if folder.parent == Path("runs"):
+            with suppress(OSError):  # it is not empty
+                folder.rmdir()
+        raise
 
 
 def _with_progress(problem: Problem, trials: int, options: dict[str, Any], console: Console) -> Result:

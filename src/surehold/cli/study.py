@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from surehold.cli import study_people, study_service
-from surehold.cli.study_options import Json, Name, Storage, opened, quiet, say
+from surehold.cli.study_options import Json, Name, Storage, opened, quiet, say, write_out
 
 __all__ = ["studies"]
 
@@ -188,7 +188,7 @@ def export(
     if out:
         write_file(Path(out), text)
     else:
-        typer.echo(text, nl=False)
+        write_out(text)
 
 
 def _space_of(parameters: str, problem: str) -> tuple[Any, dict[str, Any]]:

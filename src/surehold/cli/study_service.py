@@ -1,6 +1,5 @@
 """What runs beside a study: workers, the HTTP service, the dashboard, the report."""
 
-import signal
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -31,6 +30,7 @@ def work(
 ) -> None:
     """Make trials until the study stops (see `study stop`); start as many workers as wanted."""
     from surehold.cli.compilation import announced
+    from surehold.cli.interruption import terminable
     from surehold.cli.terminal import terminal
     from surehold.studies.trial_function import problem_of, trial_function
     from surehold.studies.worker import work as work_on
@@ -38,11 +38,7 @@ def work(
     study = opened(name, storage)
     console = terminal()
 
-    def ended(*_: Any) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, ended)
-    with announced(console):
+    with terminable(), announced(console):
         attempt = trial_function(problem_of(study.settings, function), study.settings.space)
         count = 0
 

@@ -1,5 +1,6 @@
 """The files of a run: report.html, result.json and the figures, each written whole or not at all."""
 
+import itertools
 import json
 import math
 import os
@@ -13,7 +14,7 @@ from surehold.errors import InputError
 from surehold.reports import figures, page
 from surehold.reports.run_report import Candidate, RunReport
 
-__all__ = ["checked_folder", "result_data", "write_file", "write_run"]
+__all__ = ["checked_folder", "new_folder", "result_data", "write_file", "write_run"]
 
 
 def checked_folder(folder: str | Path) -> Path:
@@ -30,10 +31,30 @@ def checked_folder(folder: str | Path) -> Path:
         with tempfile.TemporaryFile(dir=path):
             pass
     except OSError as error:
-        raise InputError(
-            f"output folder '{path}' cannot be written ({error.strerror or error}); choose another (--out)."
-        ) from None
+        raise _unwritable(path, error) from None
     return path
+
+
+def new_folder(folder: str | Path) -> Path:
+    """Create a folder that did not exist and return its path: FOLDER, or the first that is free of FOLDER-2, ...
+
+    Raises
+    ------
+    InputError
+        If it cannot be created or written.
+    """
+    path = Path(folder)
+    checked_folder(path.parent)
+    for number in itertools.count(1):
+        new = path if number == 1 else path.with_name(f"{path.name}-{number}")
+        try:
+            new.mkdir()
+            return checked_folder(new)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise _unwritable(new, error) from None
+    raise AssertionError("counting does not end")
 
 
 def write_file(path: Path, content: str | bytes) -> None:
@@ -80,6 +101,10 @@ def write_run(report: RunReport, folder: str | Path) -> Path:
         write_file(pictures / f"{name}.svg", figures.on_white(drawings[name]))
         write_file(pictures / f"{name}.png", figures.png_bytes(figure))
     return path / "report.html"
+
+
+def _unwritable(path: Path, error: OSError) -> InputError:
+    return InputError(f"output folder '{path}' cannot be written ({error.strerror or error}); choose another (--out).")
 
 
 def result_data(report: RunReport) -> dict[str, Any]:
