@@ -219,7 +219,7 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("import mug --study gone", "does not exist"),
         ("recommend mug", "no trial has given a value yet"),
         ("work mug", "says nothing about what its trials are"),
-        ("serve mug --token short", "16 printable"),
+        ("serve mug --token-file own.py", "chmod 600"),
         ("serve mug --port 70000", "65535"),
     ],
 )
@@ -314,3 +314,29 @@ def test_a_grasp_is_kept_and_worked_on(study):
     problem = sh.problems.Grasp("mug", quality="volume", closing="synergy")
     for trial in trials[3:]:  # one made by the command, two by the worker from what the study says of the problem
         assert trial["value"] == problem([trial["dx"], trial["dy"]])
+
+
+def test_tokens_are_not_taken_from_the_command_line_in_silence(tmp_path, monkeypatch, capsys):
+    from surehold.studies.service import Server
+
+    monkeypatch.setattr(Server, "run", lambda self, application: None)
+    assert run(["study", "create", "rig", "--parameters", "x=0:1"]) == 0
+    capsys.readouterr()
+    assert run(["study", "serve", "rig", "--port", "0", "--token", "0123456789abcdef"]) == 0
+    assert "all users of this machine see the token" in capsys.readouterr().err
+    monkeypatch.setenv("SUREHOLD_TOKEN", "0123456789abcdef")
+    assert run(["study", "serve", "rig", "--port", "0"]) == 0
+    assert capsys.readouterr().err == ""
+    monkeypatch.delenv("SUREHOLD_TOKEN")
+    secret = tmp_path / "secret"
+    secret.write_text("0123456789abcdef\n")
+    secret.chmod(0o640)
+    assert run(["study", "serve", "rig", "--port", "0", "--token-file", str(secret)]) == 2
+    assert "mode 640" in capsys.readouterr().err
+    secret.chmod(0o600)
+    assert run(["study", "serve", "rig", "--port", "0", "--token-file", str(secret)]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert "0123456789abcdef" not in captured.out
+    assert run(["study", "serve", "rig", "--port", "0", "--token-file", "gone"]) == 2
+    assert "cannot be read" in capsys.readouterr().err
