@@ -220,6 +220,11 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("recommend mug", "no trial has given a value yet"),
         ("work mug", "says nothing about what its trials are"),
         ("serve mug --token-file own.py", "chmod 600"),
+        ("create new --parameters n=0:1" + "0" * 400 + ":int", "bounds are finite numbers up to 1e.100"),
+        ("create new --parameters x=0:1e308", "bounds are finite numbers up to 1e.100"),
+        ("create new --parameters x=0:1 --initial 1000000000", "100,000 trials at most"),
+        ("tell mug 0 1e308", "another unit"),
+        ("tell mug 0 1" + "0" * 5000, "finite"),
         ("serve mug --port 70000", "65535"),
     ],
 )
@@ -340,3 +345,22 @@ def test_tokens_are_not_taken_from_the_command_line_in_silence(tmp_path, monkeyp
     assert "0123456789abcdef" not in captured.out
     assert run(["study", "serve", "rig", "--port", "0", "--token-file", "gone"]) == 2
     assert "cannot be read" in capsys.readouterr().err
+
+
+def test_texts_that_a_spreadsheet_would_compute(here, capsys):
+    create = ["--parameters", "x=-1:1,grip==SUM(A1)|-2|@home", "--noise", "none"]
+    assert run(["study", "create", "rig", *create]) == 0
+    assert run(["study", "add", "rig", "--at", "x=-0.5,grip==SUM(A1)", "-0.25"]) == 0
+    assert run(["study", "add", "rig", "--at", "x=0.5,grip=-2", "0.25"]) == 0
+    assert run(["study", "ask", "rig"]) == 0
+    assert run(["study", "veto", "rig", "2", "--reason", "=HYPERLINK(1)"]) == 0
+    assert run(["study", "export", "rig", "--out", "rig.csv"]) == 0
+    text = (here / "rig.csv").read_text()
+    assert ",-0.25,-0.5,'=SUM(A1)," in text, "a negative number is a number"
+    assert "'=HYPERLINK(1)" in text
+    assert run(["study", "create", "again", *create]) == 0
+    assert run(["study", "import", "again", "rig.csv"]) == 0
+    capsys.readouterr()
+    assert run(["study", "export", "again", "--json"]) == 0
+    trials = json.loads(capsys.readouterr().out)["trials"]
+    assert [t["grip"] for t in trials[:2]] == ["=SUM(A1)", "-2"]

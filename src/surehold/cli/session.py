@@ -30,6 +30,7 @@ from surehold.reports.verdict import number, verdict
 __all__ = ["Kept", "folder_for", "run_session"]
 
 REQUERIES = 100  # perturbed re-queries of a candidate; they score and are no part of the budget
+_MOST_TRIALS = 100_000  # a model of more is out of reach
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,8 @@ def run_session(
         for name, count in (("trials", trials), ("initial", initial)):
             if count < 1:
                 raise InputError(f"--{name} is {count}; give 1 or more.")
+            if count > _MOST_TRIALS:
+                raise InputError(f"--{name} is {count}; give {_MOST_TRIALS:,} at most.")
         if initial > trials:
             raise InputError(
                 f"--initial is {initial}, but --trials is {trials}; give at least as many trials as initial ones."

@@ -32,6 +32,7 @@ from surehold.optimization.lattice import Lattice
 from surehold.optimization.noise.input_noise import InputNoise
 
 __all__ = ["SearchSpace"]
+_LARGEST: Final = 1e100  # magnitude of a bound; what is computed with larger ones overflows
 
 
 class _Numeric(NamedTuple):
@@ -223,12 +224,14 @@ class SearchSpace:
 
 def _distribution(name: str, value: Any) -> BaseDistribution:
     if isinstance(value, BaseDistribution):
-        limits = () if isinstance(value, CategoricalDistribution) else (_numeric(name, value)[1:3])
-        if not np.all(np.isfinite(limits)):
-            raise InputError(f"parameter '{name}' has the bounds {limits}; both must be finite numbers.")
+        for limit in () if isinstance(value, CategoricalDistribution) else _numeric(name, value)[1:3]:
+            if not abs(limit) <= _LARGEST:
+                raise InputError(
+                    f"parameter '{name}' has the bound {str(limit)[:20]}; bounds are finite numbers up to {_LARGEST:g}."
+                )
         return value
     box = Box({name: value})
-    return FloatDistribution(float(box.lower[0]), float(box.upper[0]))
+    return _distribution(name, FloatDistribution(float(box.lower[0]), float(box.upper[0])))
 
 
 def _numeric(name: str, distribution: BaseDistribution) -> _Numeric:
