@@ -80,7 +80,7 @@ def grasp(
     input_noise = noise_of(noise or "none", method)
 
     from surehold.cli.compilation import announced
-    from surehold.cli.session import Kept, folder_for, run_session
+    from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
     from surehold.problems.grasp.problem import Grasp
@@ -153,7 +153,10 @@ def grasp(
         if report.recommended.scene is not None:
             files.write_file(folder / "grasp.png", still_picture(report.recommended.scene)[0])
 
-    run_session(
+    def outcomes(result: Any) -> Counter[str]:
+        return Counter(problem.grasp(x).status for x in result.X)
+
+    report = run_session(
         problem,
         title=f"Grasp the {problem.object.name} from the {problem.facet}",
         method=method,
@@ -181,9 +184,14 @@ def grasp(
         units=dict(zip(problem.box.names, problem.units, strict=True)),
         quality_name=f"quality ({problem.simulator.quality})",
         disturbance="the hand is off",
+        success_above=0.0,
+        outcomes=outcomes,
+        advice="Try another --facet, more --variables (dz, rx, ry, rz or s1), another --preshape, or more --trials.",
         kept=kept,
         console=console,
     )
+    if not report.succeeded:
+        raise typer.Exit(NO_SUCCESS)
 
 
 def neighbors_of(problem: Any, candidate: Any) -> Any:

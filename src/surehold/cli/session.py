@@ -27,7 +27,9 @@ from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.verdict import number, verdict
 
-__all__ = ["Kept", "folder_for", "run_session"]
+__all__ = ["NO_SUCCESS", "Kept", "folder_for", "run_session"]
+
+NO_SUCCESS = 3  # exit code of a run whose trials all gave a value, none of which is a success
 
 REQUERIES = 100  # perturbed re-queries of a candidate; they score and are no part of the budget
 _MOST_TRIALS = 100_000  # a model of more is out of reach
@@ -81,6 +83,9 @@ def run_session(
     units: Mapping[str, str] | None = None,
     quality_name: str = "value",
     disturbance: str = "the input is off",
+    success_above: float | None = None,
+    outcomes: Callable[[Result], Mapping[str, int]] = lambda result: {},
+    advice: str = "",
     kept: Kept | None = None,
     console: Console | None = None,
 ) -> RunReport:
@@ -88,7 +93,9 @@ def run_session(
 
     A run that is kept as a study is resumed where that exists.
 
-    `describe` adds to a candidate what the problem knows of it; `also_write` writes further files.
+    `describe` adds to a candidate what the problem knows of it; `also_write` writes further files. Where no trial is
+    worth more than `success_above`, the report says so first, with the counts of `outcomes` and `advice`; what the
+    caller returns then is `NO_SUCCESS` as exit code.
 
     Raises
     ------
@@ -158,6 +165,9 @@ def run_session(
                 disturbance=disturbance,
                 planned_trials=trials,
                 notes=notes,
+                success_above=success_above,
+                outcomes={} if _any_above(result, success_above) else outcomes(result),
+                advice=advice,
             )
             path = files.write_run(report, folder)
             also_write(report, folder)
@@ -281,15 +291,23 @@ def _show(report: RunReport, path: Path, seconds: float, console: Console) -> No
         table.add_column("highest observed = recommended" if alone else candidate.label, overflow="fold")
     for name, cells in page.table_rows(report):
         table.add_row(_plain(name), *(_plain(cell) for cell in cells))
+    told = verdict(report)
+    if not report.succeeded:
+        console.print(f"\n[bold]{_plain(told.headline)}[/bold] {_plain(told.text)}")
     console.print()
     console.print(table)
     console.print()
-    console.print(_plain(verdict(report).headline))
+    if report.succeeded:
+        console.print(_plain(told.headline))
     for note in report.notes:
         console.print(f"Note: {_plain(note)}")
     failed = int(np.sum(report.failed))
     rest = f", {failed} failed" if failed else ""
     console.print(f"{report.y.size} trials{rest} in {seconds:.1f} s. Report: {_plain(str(path))}", soft_wrap=True)
+
+
+def _any_above(result: Result, limit: float | None) -> bool:
+    return limit is None or bool(np.nanmax(result.y) > limit)
 
 
 def _plain(text: str) -> str:
