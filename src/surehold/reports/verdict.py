@@ -119,9 +119,8 @@ def verdict(report: RunReport) -> Verdict:
         )
         return Verdict(headline, text, False)
     if gap > 0.0:
-        yet = (
-            f", but falls to {number(answer.worst)} at worst (the peak to {number(highest.worst)})" if tail < 0 else ""
-        )
+        deeper = answer.worst < highest.worst - _notable(report)
+        yet = f", but falls to {number(answer.worst)} at worst (the peak to {number(highest.worst)})" * deeper
         headline = (
             f"The highest peak ({number(highest.quality)}) was refused: when {off} it is worth only "
             f"{number(highest.mean)}, the recommended point {number(answer.mean)}{yet}."
@@ -148,6 +147,12 @@ def _of_nothing(report: RunReport) -> Verdict:
     )
 
 
+def _notable(report: RunReport) -> float:
+    """Return from which difference on bad cases count as different, in the units of the values."""
+    told = report.y[~report.failed]
+    return _NOTABLE * float(told.max() - told.min())
+
+
 def _tail(report: RunReport) -> int:
     """Return 1 where the recommended point's bad cases are better than the highest one's, -1 if worse, 0 if alike.
 
@@ -155,10 +160,8 @@ def _tail(report: RunReport) -> int:
     range of values that the run met decides.
     """
     highest, answer = report.highest, report.recommended
-    told = report.y[~report.failed]
-    least = _NOTABLE * float(told.max() - told.min())
     for difference in (answer.low - highest.low, answer.worst - highest.worst):
-        if abs(difference) > least:
+        if abs(difference) > _notable(report):
             return 1 if difference > 0.0 else -1
     return 0
 
