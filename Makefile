@@ -1,8 +1,9 @@
 # One command for each task; each makes the environment it needs.
 PYTHON ?= python3
 BIN := .venv/bin
+LOWEST := .venv/lowest
 
-.PHONY: grasp test check bench reproduction clean
+.PHONY: grasp test explore check lowest bench reproduction clean
 
 grasp: .venv/.installed
 	$(BIN)/surehold grasp mug
@@ -10,11 +11,21 @@ grasp: .venv/.installed
 test: .venv/.developer
 	$(BIN)/pytest
 
+# Tests by property with new random examples, many more of them; before a release.
+explore: .venv/.developer
+	HYPOTHESIS_PROFILE=explore $(BIN)/pytest -m hypothesis
+
 check: .venv/.developer
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports
+
+# The main public paths on the oldest libraries that pyproject.toml allows.
+lowest: .venv/.developer
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(LOWEST)
+	$(BIN)/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct '.[all]'
+	$(LOWEST)/bin/python .ci/smoke.py
 
 bench: .venv/.developer
 	$(BIN)/python -m benchmarks
@@ -31,7 +42,7 @@ clean:
 	touch $@
 
 .venv/.installed: pyproject.toml | .venv/.created
-	$(BIN)/pip install --quiet --editable .
+	$(BIN)/pip install --quiet --editable '.[campaign,cli,grasp,report]'
 	touch $@
 
 .venv/.developer: pyproject.toml | .venv/.created

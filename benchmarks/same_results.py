@@ -83,8 +83,8 @@ def run(name: str, trials: int | None = None) -> list[float]:
     return [*optimizer.X.ravel().tolist(), *best.x.tolist(), best.mean, best.quantile]
 
 
-def grasps() -> Iterator[tuple[str, list[float]]]:
-    """Yield a name and the quality and joint angles of two hundred and more random grasps."""
+def grasps(each: int = 12) -> Iterator[tuple[str, list[float]]]:
+    """Yield a name and the quality and joint angles of random grasps, `each` for 20 pairs of object and options."""
     for o, obj in enumerate(OBJECTS):
         for k, options in enumerate(GRASP_OPTIONS):
             facet = FACETS[(o + k) % len(FACETS)]
@@ -92,7 +92,7 @@ def grasps() -> Iterator[tuple[str, list[float]]]:
                 obj, facet=facet, variables=("dx", "dy", "dz", "rx", "ry", "rz", "s1"), **options
             )
             rng = np.random.default_rng([o, k])
-            for i in range(12):
+            for i in range(each):
                 x = problem.box.from_unit(0.5 + 0.35 * (rng.random(7) - 0.5))
                 outcome = problem.grasp(x)
                 yield f"{obj} {facet} {k} {i}", [outcome.quality, *np.ravel(outcome.joints).tolist()]

@@ -7,17 +7,19 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-try:
-    from sklearn.base import BaseEstimator, RegressorMixin
-    from sklearn.utils import check_random_state
-    from sklearn.utils.validation import check_is_fitted, validate_data
-except ImportError as error:
-    raise ImportError("surehold.sklearn needs scikit-learn; install it with: pip install surehold[sklearn]") from error
-
+from surehold.extras import require
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, NoiseName
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
+
+try:
+    from sklearn.base import BaseEstimator, RegressorMixin
+    from sklearn.utils import check_random_state
+    from sklearn.utils.validation import check_is_fitted, validate_data
+except ImportError:
+    require("sklearn", "surehold.sklearn")
+    raise
 
 __all__ = ["GaussianProcessRegressor", "TreedGaussianProcessRegressor"]
 

@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -247,11 +248,24 @@ def test_doctor_version_and_help(capsys):
     assert run(["doctor"]) == 0
     out = capsys.readouterr().out
     assert "numba" in out
-    assert "compiled kernels" in out
+    kept, kernels = map(int, re.search(r"(\d+) of (\d+) are in the cache", out).groups())
+    assert kept <= kernels
+    assert kernels > 60, "the kernels of all rooms are counted"
+    assert "extra grasp" in out
+    assert "pip install" not in out, "everything is installed where the tests run"
     assert run(["--version"]) == 0
     assert capsys.readouterr().out.startswith("surehold 0.")
     assert run(["grasp", "--help"]) == 0
     assert "--facet" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("group", "command"), [("", "maximize"), ("campaign", "report"), ("study", "recommend")])
+def test_a_group_alone_prints_its_help(group, command, capsys):
+    assert surehold(group) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert captured.out.startswith(f"Usage: surehold {group}".rstrip())
+    assert any(line.split()[:1] == [command] for line in captured.out.splitlines())
 
 
 def test_the_module_is_the_command(here):

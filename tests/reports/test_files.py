@@ -38,13 +38,3 @@ def test_unwritable_places(rkhs_report, tmp_path):
         with pytest.raises(InputError, match="cannot be written"):
             files.write_run(rkhs_report, place)
     assert (tmp_path / "taken").read_text() == "a file"
-
-
-def test_a_failed_write_keeps_the_old_file(tmp_path):
-    target = tmp_path / "report.html"
-    target.mkdir()
-    with pytest.raises(InputError, match="cannot be written"):
-        files.write_file(target, "new")
-    assert list(tmp_path.iterdir()) == [target]
-    with pytest.raises(InputError, match="cannot be written"):
-        files.write_file(tmp_path / "missing" / "x", "new")

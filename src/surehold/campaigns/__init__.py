@@ -7,3 +7,7 @@ table              the rows on disk
 statistics, comparison, published, thesis   what the runs say, beside each other and beside the thesis
 sections, costs, illustrations, report, reproduction   the page, the CSVs and the document made from them
 """
+
+from surehold.extras import require
+
+require("campaign", "surehold.campaigns")

@@ -21,7 +21,7 @@ from surehold.campaigns.table import Records, read_folder
 from surehold.campaigns.thesis import exhibit_of
 from surehold.errors import InputError
 from surehold.reports.campaign_report import CampaignReport, Section
-from surehold.reports.files import checked_folder, write_file
+from surehold.store.atomic import checked_folder, write_file
 
 __all__ = ["campaign_report", "read_campaigns", "write_report"]
 

@@ -12,7 +12,7 @@ from surehold.campaigns.report import campaign_report, read_campaigns
 from surehold.campaigns.table import Records, pack
 from surehold.reports.campaign_page import markdown_table
 from surehold.reports.campaign_report import Table
-from surehold.reports.files import write_file
+from surehold.store.atomic import write_file
 
 __all__ = ["reproduction_text"]
 

@@ -12,10 +12,11 @@ from surehold.campaigns.problem_setup import build_problem
 from surehold.campaigns.single_run import run_once
 from surehold.campaigns.table import Records, opened
 from surehold.errors import InputError, SureholdError, unknown_name
+from surehold.extras import require
 
 __all__ = ["Progress", "checked_backend", "run_campaign"]
 
-BACKENDS = ("loky", "dask", "ray")
+BACKENDS = ("loky", "dask")
 
 
 @dataclass
@@ -78,8 +79,8 @@ def run_campaign(
     workers
         Processes; 1 works in this one.
     backend
-        "loky" (processes on this machine), "dask" or "ray" (a cluster of `workers` on this machine), `dask://HOST:PORT`
-        or `ray://HOST:PORT` (a cluster that is there).
+        "loky" (processes on this machine), "dask" (a cluster of `workers` on this machine) or `dask://HOST:PORT` (a
+        cluster that is there).
     retry
         Whether to make runs again that failed.
     observer
@@ -135,14 +136,11 @@ def checked_backend(backend: str) -> tuple[str, str]:
     InputError
         If it is unknown, or its library is not installed.
     """
-    from importlib.util import find_spec
-
     kind, _, address = backend.partition("://")
     if kind not in BACKENDS or (kind == "loky" and address):
-        raise unknown_name("backend", backend, [*BACKENDS, "dask://HOST:PORT", "ray://HOST:PORT"])
-    module = {"dask": "distributed", "ray": "ray"}.get(kind)
-    if module is not None and find_spec(module) is None:
-        raise InputError(f"backend '{kind}' is not installed; pip install 'surehold[{kind}]'.")
+        raise unknown_name("backend", backend, [*BACKENDS, "dask://HOST:PORT"])
+    if kind == "dask":
+        require("dask", "the backend 'dask'")
     return kind, address
 
 
@@ -156,21 +154,16 @@ def _one_by_one(tasks: Sequence[Task]) -> Iterator[dict[str, Any]]:
 
 
 def _spread(tasks: Sequence[Task], workers: int, kind: str, backend: str) -> Iterator[dict[str, Any]]:
-    """Yield rows as workers finish them; joblib's Ray backend gives them in waves of `workers`."""
+    """Yield rows as workers finish them."""
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     settings: dict[str, Any] = {"n_jobs": workers, "batch_size": 1, "pre_dispatch": workers}
+    settings["return_as"] = "generator_unordered"
     try:
         with _cluster(kind, checked_backend(backend)[1], workers):
-            if kind == "ray":
-                with Parallel(**settings) as parallel:
-                    for i in range(0, len(tasks), workers):
-                        rows = parallel(delayed(run_once)(*task) for task in tasks[i : i + workers])
-                        yield from cast(list[dict[str, Any]], rows)
-            else:
-                parallel = Parallel(**settings, return_as="generator_unordered")
-                yield from cast(Iterator[dict[str, Any]], parallel(delayed(run_once)(*task) for task in tasks))
+            parallel = Parallel(**settings)
+            yield from cast(Iterator[dict[str, Any]], parallel(delayed(run_once)(*task) for task in tasks))
     except TerminatedWorkerError:
         raise SureholdError(
             "a worker process died, killed by the system or out of memory; the finished runs are kept. Start again, "
@@ -194,15 +187,6 @@ def _cluster(kind: str, address: str, workers: int) -> Iterator[None]:
                     LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0")
                 )
             settings["client"] = stack.enter_context(Client(cluster))
-        elif kind == "ray":
-            import ray  # pyright: ignore[reportMissingImports]
-            from ray.util.joblib import register_ray  # pyright: ignore[reportMissingImports]
-
-            register_ray()
-            if not ray.is_initialized():
-                options: dict[str, Any] = {"address": f"ray://{address}"} if address else {"num_cpus": workers}
-                ray.init(include_dashboard=False, log_to_driver=False, logging_level=40, **options)
-                stack.callback(ray.shutdown)
         else:
             settings["inner_max_num_threads"] = 1
         stack.enter_context(parallel_config(kind, **settings))

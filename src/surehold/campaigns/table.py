@@ -5,7 +5,6 @@ runs; all are read together. A line that is damaged (the machine went down while
 made again. One process writes to a table at a time.
 """
 
-import fcntl
 import gzip
 import json
 import os
@@ -13,11 +12,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, TextIO
+from typing import Any, Final
 
 from surehold.campaigns.plan import Plan
 from surehold.errors import InputError, SureholdError
-from surehold.reports.files import checked_folder, write_file
+from surehold.store.atomic import checked_folder, write_file
+from surehold.store.locks import LockTaken, locked
 
 __all__ = ["PACKED", "Records", "Table", "opened", "pack", "read_folder"]
 
@@ -194,23 +194,14 @@ def pack(folders: Sequence[str | Path], target: str | Path) -> Path:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    file: TextIO = open(path, "a+", encoding="ascii")  # noqa: SIM115 - held open: the lock ends with the process
     try:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            file.seek(0)
-            owner = file.read().strip() or "unknown"
-            raise InputError(
-                f"another process ({owner}) runs this campaign in '{path.parent}'; wait for it, or take another share "
-                "(--shard) or folder (--out)."
-            ) from None
-        file.truncate(0)
-        file.write(str(os.getpid()))
-        file.flush()
-        yield
-    finally:
-        file.close()
+        with locked(path, wait=False):
+            yield
+    except LockTaken as error:
+        raise InputError(
+            f"another process ({error.owner}) runs this campaign in '{path.parent}'; wait for it, or take another "
+            "share (--shard) or folder (--out)."
+        ) from None
 
 
 def _repaired(path: Path) -> list[str]:

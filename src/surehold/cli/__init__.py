@@ -16,11 +16,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run the command line and return its exit code."""
+    from surehold.errors import InputError, SureholdError
+    from surehold.extras import require
+
+    try:
+        require("cli", "the command line")
+        return _run(arguments)
+    except InputError as error:
+        _say(str(error))
+        return 2
+    except SureholdError as error:
+        _say(str(error))
+        return 1
+    except KeyboardInterrupt:
+        return _interrupted()
+
+
+def _run(arguments: list[str]) -> int:
     import typer
     from typer import exceptions
 
     from surehold.cli.application import application
-    from surehold.errors import InputError, SureholdError
 
     try:
         code = typer.main.get_command(application())(args=arguments, prog_name="surehold", standalone_mode=False)
@@ -31,15 +47,13 @@ def run(arguments: list[str]) -> int:
         return end.exit_code
     except exceptions.TyperException as error:
         format_message = getattr(error, "format_message", None)
-        _say(f"{format_message() if format_message else error} See surehold --help.")
+        message = format_message() if format_message else str(error)
+        if type(error).__name__ == "NoArgsIsHelpError":  # of a group alone; typer keeps the class to itself
+            typer.echo(message)
+            return 0
+        _say(f"{message} See surehold --help.")
         return int(getattr(error, "exit_code", 2))
-    except InputError as error:
-        _say(str(error))
-        return 2
-    except SureholdError as error:
-        _say(str(error))
-        return 1
-    except (KeyboardInterrupt, typer.Abort):
+    except typer.Abort:
         return _interrupted()
 
 

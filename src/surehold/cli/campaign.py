@@ -33,7 +33,7 @@ def run(
     out: Annotated[str, typer.Option(help="Folder of the table; by default runs/campaigns/PLAN.")] = "",
     shard: Annotated[str, typer.Option(help="A share of the runs, such as 2/8, for several machines.")] = "1/1",
     backend: Annotated[
-        str, typer.Option(help="loky (this machine), dask, ray, dask://HOST:PORT or ray://HOST:PORT.")
+        str, typer.Option(help="loky (this machine), dask (a cluster on it), or dask://HOST:PORT (one that is there).")
     ] = "loky",
     only: Only = "",
     retry: Annotated[bool, typer.Option("--retry", help="Make runs again that failed.")] = False,

@@ -11,14 +11,7 @@ from typing import Any
 
 __all__ = ["doctor"]
 
-REQUIRED = ("numpy", "scipy", "numba", "trimesh", "manifold3d", "matplotlib", "jinja2", "typer", "rich", "PyYAML")
-OPTIONAL = {
-    "libigl": "distances to your own meshes",
-    "mujoco": "other hands, physics as the second opinion",
-    "optuna": "storage, workers and dashboard",
-    "scikit-learn": "estimators in its style",
-}
-KERNELS = ("surehold.optimization", "surehold.grasping")
+CORE = ("numpy", "scipy", "numba", "threadpoolctl", "lazy_loader")
 
 
 def doctor() -> None:
@@ -27,6 +20,7 @@ def doctor() -> None:
     from rich.table import Table
 
     from surehold import __version__
+    from surehold.extras import EXTRAS, missing
 
     table = Table(show_edge=False, pad_edge=False, show_header=False)
     table.add_column(style="bold")
@@ -34,14 +28,19 @@ def doctor() -> None:
     table.add_row("surehold", __version__)
     table.add_row("Python", f"{platform.python_version()} on {platform.platform()}")
     table.add_row("cores", str(os.cpu_count()))
-    for name in REQUIRED:
-        table.add_row(name, version_of(name) or "MISSING: reinstall with pip install surehold")
-    for name, use in OPTIONAL.items():
-        table.add_row(name, version_of(name) or f"not installed; optional, for {use}")
+    for name in CORE:
+        table.add_row(name, version_of(name) or "MISSING: pip install surehold")
+    for extra, names in EXTRAS.items():
+        absent = missing(extra)
+        advice = f"; without {', '.join(absent)}: pip install 'surehold[{extra}]'" if absent else ""
+        have = ", ".join(f"{name} {version_of(name)}" for name in names if name not in absent)
+        table.add_row(f"extra {extra}", f"{have or 'not installed'}{advice}", style="dim" if absent else None)
     compiled, total = compiled_kernels()
     table.add_row("compiled kernels", f"{compiled} of {total} are in the cache; others are compiled when first used")
-    table.add_row("kernel cache", ", ".join(sorted({str(p) for p in kernel_folders()})) or "none")
-    table.add_row("data cache", data_cache())
+    folders = kernel_folders()
+    table.add_row("kernel cache", f"{len(folders)} folders in {os.path.commonpath(folders)}" if folders else "none")
+    if not missing("grasp"):
+        table.add_row("data cache", data_cache())
     for name, found in graphics_libraries().items():
         table.add_row(name, found or "not found; only needed for still pictures by MuJoCo")
     Console(highlight=False).print(table)
@@ -86,9 +85,11 @@ def _kernels() -> Iterator[tuple[Path, Path]]:
     """Yield the index file and the cache folder of every kernel."""
     from numba.core.registry import CPUDispatcher
 
+    from surehold.extras import missing
+
     seen: set[int] = set()
-    for package in KERNELS:
-        for info in pkgutil.iter_modules(importlib.import_module(package).__path__, f"{package}."):
+    for package in ("surehold.optimization", *([] if missing("grasp") else ["surehold.grasping"])):
+        for info in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
             module = importlib.import_module(info.name)
             for value in vars(module).values():
                 if isinstance(value, CPUDispatcher) and id(value) not in seen:

@@ -84,9 +84,10 @@ def grasp(
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
     from surehold.problems.grasp.problem import Grasp
-    from surehold.reports import files, gather
+    from surehold.reports import gather
     from surehold.reports.run_report import Candidate, RunReport
     from surehold.reports.still import still_picture
+    from surehold.store.atomic import write_file
 
     names = tuple(name.strip() for name in variables.split(",") if name.strip())
     described = {
@@ -149,9 +150,9 @@ def grasp(
         write_grasps(problem, report, folder / "grasps.yaml")
         every = {c.label: {"x": c.x, "grasp": problem.grasp(c.x)} for c in report.candidates}
         text = json.dumps(grasp_to_dict(every), indent=1, allow_nan=False)
-        files.write_file(folder / "grasps.json", text + "\n")
+        write_file(folder / "grasps.json", text + "\n")
         if report.recommended.scene is not None:
-            files.write_file(folder / "grasp.png", still_picture(report.recommended.scene)[0])
+            write_file(folder / "grasp.png", still_picture(report.recommended.scene)[0])
 
     def outcomes(result: Any) -> Counter[str]:
         return Counter(problem.grasp(x).status for x in result.X)

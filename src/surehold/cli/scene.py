@@ -55,17 +55,18 @@ def scene(
     from surehold.grasping.object.model import OBJECTS
     from surehold.problems.grasp.default_poses import default_facet
     from surehold.problems.grasp.problem import Grasp
-    from surehold.reports import files, gather
+    from surehold.reports import gather
     from surehold.reports.run_report import Candidate
     from surehold.reports.scenes_page import render_scenes
     from surehold.reports.still import still_picture
+    from surehold.store.atomic import checked_folder, write_file
 
     console = terminal()
     gripper = hand_of(hand, hand_config)
     quick = hand == "icub-left" and not preshape and (not obj or obj in OBJECTS)
     if facet:
         _modes(facet)  # explains an unknown one at once
-    folder = files.checked_folder(out or Path("runs") / f"scene-{Path(obj).stem or 'objects'}")
+    folder = checked_folder(out or Path("runs") / f"scene-{Path(obj).stem or 'objects'}")
     views, notes, rows, data = [], [], [], []
     best = -np.inf
     picture = None
@@ -115,13 +116,13 @@ def scene(
         f"{_ALONG * _ACROSS} grasps around the default pose. The slider closes the fingers."
     )
     page = render_scenes("Objects, facets and modes", text, views, notes, _COLUMNS, rows)
-    files.write_file(folder / "scene.html", page)
+    write_file(folder / "scene.html", page)
     plain = grasp_to_dict({"hand": gripper.name, "grasps": data})
-    files.write_file(folder / "scene.json", json.dumps(plain, indent=1, allow_nan=False) + "\n")
+    write_file(folder / "scene.json", json.dumps(plain, indent=1, allow_nan=False) + "\n")
     drawn_by = "nothing"
     if picture is not None:
         png, drawn_by = still_picture(picture)
-        files.write_file(folder / "scene.png", png)
+        write_file(folder / "scene.png", png)
     closed = sum(row[5] == "ok" for row in rows)
     console.print(
         f"{len(rows)} mode{'s' if len(rows) != 1 else ''}, {closed} with a grasp that closes; the best is worth "

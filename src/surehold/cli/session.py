@@ -26,6 +26,7 @@ from surehold.problems.problem import Problem
 from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.verdict import number, verdict
+from surehold.store.atomic import checked_folder, new_folder
 
 __all__ = ["NO_SUCCESS", "Kept", "folder_for", "run_session"]
 
@@ -58,11 +59,11 @@ def folder_for(name: str, method: str, seed: int, out: str, study: str = "") -> 
     if study and not out:
         from surehold.studies.storage import checked_name
 
-        return files.checked_folder(Path("runs") / checked_name(study))
+        return checked_folder(Path("runs") / checked_name(study))
     if out:
-        return files.checked_folder(out)
+        return checked_folder(out)
     slug = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower()[:100] or "run"
-    return files.new_folder(Path("runs") / f"{slug}-{method}-seed{seed}")
+    return new_folder(Path("runs") / f"{slug}-{method}-seed{seed}")
 
 
 def run_session(

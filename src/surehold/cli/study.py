@@ -180,7 +180,7 @@ def export(
     as_json: Json = False,
 ) -> None:
     """Write all trials as CSV, or with --json as JSON with the settings."""
-    from surehold.reports.files import write_file
+    from surehold.store.atomic import write_file
     from surehold.studies.status import to_csv, to_json
 
     study = opened(name, storage)

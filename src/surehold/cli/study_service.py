@@ -129,15 +129,11 @@ def dashboard(
 ) -> None:
     """Show the study in optuna-dashboard, with the model and the recommendation."""
     import webbrowser
-    from importlib.util import find_spec
 
-    from surehold.errors import InputError
     from surehold.reports.interactive import interactive_plots
     from surehold.reports.study_report import study_report
     from surehold.studies.dashboard import Dashboard
 
-    if find_spec("optuna_dashboard") is None:
-        raise InputError("optuna-dashboard is not installed; install it with: pip install 'surehold[study]'.")
     study = opened(name, storage)
 
     def ready(address: str) -> None:

@@ -1,86 +1,17 @@
 """The files of a run: report.html, result.json and the figures, each written whole or not at all."""
 
-import itertools
 import json
 import math
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from surehold.errors import InputError
 from surehold.reports import figures, page
 from surehold.reports.run_report import Candidate, RunReport
+from surehold.store.atomic import checked_folder, write_file
 
-__all__ = ["checked_folder", "new_folder", "result_data", "write_file", "write_run"]
-
-
-def checked_folder(folder: str | Path) -> Path:
-    """Create the folder if needed and return its path, after a trial write.
-
-    Raises
-    ------
-    InputError
-        If it cannot be created or written, or a file stands in its place.
-    """
-    path = Path(folder)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            pass
-    except OSError as error:
-        raise _unwritable(path, error) from None
-    return path
-
-
-def new_folder(folder: str | Path) -> Path:
-    """Create a folder that did not exist and return its path: FOLDER, or the first that is free of FOLDER-2, ...
-
-    Raises
-    ------
-    InputError
-        If it cannot be created or written.
-    """
-    path = Path(folder)
-    checked_folder(path.parent)
-    for number in itertools.count(1):
-        new = path if number == 1 else path.with_name(f"{path.name}-{number}")
-        try:
-            new.mkdir()
-            return checked_folder(new)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise _unwritable(new, error) from None
-    raise AssertionError("counting does not end")
-
-
-def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file whole: under a temporary name beside it, then renamed over what was there.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written; what was there before stays.
-    """
-    raw = content.encode("utf-8") if isinstance(content, str) else content
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "wb") as file:
-            file.write(raw)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)  # mkstemp makes files that only their owner reads
-        os.replace(temporary, path)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        raise InputError(
-            f"file '{path}' cannot be written ({error.strerror or error}); free the place or choose another."
-        ) from None
+__all__ = ["result_data", "write_run"]
 
 
 def write_run(report: RunReport, folder: str | Path) -> Path:
@@ -101,10 +32,6 @@ def write_run(report: RunReport, folder: str | Path) -> Path:
         write_file(pictures / f"{name}.svg", figures.on_white(drawings[name]))
         write_file(pictures / f"{name}.png", figures.png_bytes(figure))
     return path / "report.html"
-
-
-def _unwritable(path: Path, error: OSError) -> InputError:
-    return InputError(f"output folder '{path}' cannot be written ({error.strerror or error}); choose another (--out).")
 
 
 def result_data(report: RunReport) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, RDBSto
 from optuna.storages.journal import BaseJournalBackend, JournalFileBackend
 
 from surehold.errors import InputError
+from surehold.store.locks import file_lock, locked
 
 __all__ = ["JOURNAL", "Storage", "StorageFailure", "checked_name", "open_storage"]
 
@@ -113,7 +114,7 @@ class Storage:
     @contextmanager
     def _across_processes(self, name: str) -> Iterator[None]:
         if self._lock_file is not None:
-            with _locked(self._lock_file):
+            with locked(self._lock_file):
                 yield
         elif self._engine is not None:
             from sqlalchemy import text
@@ -156,16 +157,6 @@ def open_storage(url: str, name: str, *, create: bool) -> Storage:
 # --- files --------------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Hold the operating system's lock of a file."""
-    import fcntl
-
-    with open(path, "ab") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield  # closing the file lets go of it
-
-
 class _JournalLock:
     """The lock of a journal's writers, in the form that Optuna asks for.
 
@@ -176,19 +167,19 @@ class _JournalLock:
 
     def __init__(self, journal: Path):
         self._journal = journal
-        self._held = threading.local()
+        self._lock = file_lock(journal.with_name(f"{journal.name}.lock"))
 
     def acquire(self) -> bool:
-        import fcntl
-
-        file = open(self._journal, "ab")  # noqa: SIM115
-        fcntl.flock(file, fcntl.LOCK_EX)
-        self._held.file = file
-        self._mend()
+        self._lock.acquire()
+        try:
+            self._mend()
+        except BaseException:
+            self._lock.release()
+            raise
         return True
 
     def release(self) -> None:
-        self._held.file.close()
+        self._lock.release()
 
     def mend(self) -> None:
         """Cut off a damaged last line, if there is one; a line that is just being written is waited for."""
@@ -298,10 +289,6 @@ def _sqlite(url: str, create: bool) -> Storage:
 
 
 def _postgresql(driver_url: str, url: str) -> Storage:
-    from importlib.util import find_spec
-
-    if find_spec("psycopg") is None:
-        raise InputError("storage on PostgreSQL needs psycopg; install it with: pip install 'surehold[study]'.")
     storage, engine = _database(driver_url, url, {"pool_pre_ping": True, "connect_args": {"connect_timeout": 10}})
     return Storage(storage, url, None, engine)
 

@@ -10,9 +10,9 @@ to the tolerance, whatever the shape of the object.
 """
 
 import numpy as np
-from numba import njit
 
 from surehold.grasping.object.distance_field import field_distance
+from surehold.store.kernels import njit
 
 __all__ = ["box_gap", "capsule_gap", "capsule_pair_gap", "palm_gap"]
 

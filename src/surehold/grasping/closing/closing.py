@@ -23,11 +23,11 @@ there; contacts.py blends the two outcomes.
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from surehold.grasping.closing.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap
 from surehold.grasping.hand.model import axis_ends, finger_frames
+from surehold.store.kernels import njit
 
 __all__ = ["CLOSING_MODES", "TOUCH", "Closed", "close_hand", "hand_gaps"]
 

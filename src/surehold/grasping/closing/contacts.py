@@ -25,12 +25,12 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from surehold.grasping.closing.clearance import capsule_gap
 from surehold.grasping.hand.model import Hand, link_frames
 from surehold.grasping.object.distance_field import field_distance, field_distance_gradient
+from surehold.store.kernels import njit
 
 __all__ = [
     "CONTACT_MODELS",

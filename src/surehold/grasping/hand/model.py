@@ -15,8 +15,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from surehold.store.kernels import njit
 
 __all__ = ["CLOSED", "Hand", "Preshape", "chain_row", "finger_frames", "link_ends", "link_frames"]
 

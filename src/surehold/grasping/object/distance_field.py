@@ -20,12 +20,13 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.solids import signed_distance
+from surehold.store.atomic import replacing
+from surehold.store.kernels import njit
 
 __all__ = [
     "DistanceField",
@@ -148,15 +149,10 @@ def _load(path: Path, shape: tuple[int, ...]) -> NDArray[np.float32] | None:
 
 
 def _store(path: Path, nodes: NDArray[np.float32]) -> None:
-    scratch = path.with_suffix(f".{os.getpid()}.tmp")
-    try:
+    with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with scratch.open("wb") as file:
+        with replacing(path) as file:
             np.save(file, nodes)
-        scratch.replace(path)  # whole files only, whoever else computes the same
-    except OSError:
-        with suppress(OSError):
-            scratch.unlink()
 
 
 @njit(cache=True)

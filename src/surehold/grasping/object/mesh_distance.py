@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import InputError
+from surehold.extras import require
 from surehold.grasping.object.model import GraspObject
 
 __all__ = ["mesh_distance"]
@@ -39,13 +39,8 @@ def mesh_distance(
     InputError
         If libigl is not installed.
     """
-    try:
-        import igl
-    except ImportError:
-        raise InputError(
-            f"object '{obj.name}' is a mesh of its own, whose distances libigl computes; "
-            "install it with: pip install 'surehold[mesh]'."
-        ) from None
+    require("mesh", f"the distance field of the mesh '{obj.name}'")
+    import igl
     from scipy.ndimage import distance_transform_edt
 
     faces = obj.faces.astype(np.int64)

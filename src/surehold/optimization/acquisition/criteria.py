@@ -13,9 +13,10 @@ from math import erfc, exp, log, pi, sqrt
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
+
+from surehold.store.kernels import njit
 
 __all__ = [
     "Value",

@@ -16,8 +16,9 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from surehold.store.kernels import njit
 
 __all__ = ["divide_rectangles"]
 

@@ -19,11 +19,12 @@ from math import cos, log, pi, sin, sqrt
 from typing import Any, Final
 
 import numpy as np
-from numba import njit, typeof, types
+from numba import typeof, types
 from numpy.typing import NDArray
 
 from surehold.optimization.samplers.slice import SliceSamples
 from surehold.optimization.surrogates.gaussian_process.likelihood import EVIDENCE_TYPE, Evidence
+from surehold.store.kernels import njit
 
 __all__ = ["elliptical_slice_sample"]
 

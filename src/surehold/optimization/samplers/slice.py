@@ -12,10 +12,11 @@ from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, typeof, types
+from numba import typeof, types
 from numpy.typing import NDArray
 
 from surehold.optimization.surrogates.gaussian_process.likelihood import EVIDENCE_TYPE, Evidence
+from surehold.store.kernels import njit
 
 __all__ = ["SliceSamples", "slice_sample"]
 

@@ -18,7 +18,7 @@ from math import exp, inf, log, pi, sqrt
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numpy.typing import NDArray
 
 from surehold.optimization.samplers.slice import SliceSamples, slice_sample
@@ -28,6 +28,7 @@ from surehold.optimization.surrogates.gaussian_process.model import SURPRISE, Ga
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import surprise
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
+from surehold.store.kernels import njit
 
 __all__ = ["LocalGlobalProcess"]
 

@@ -11,7 +11,6 @@ hands and for meshes is kept in the cache folder.
 """
 
 import json
-import os
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -26,6 +25,7 @@ from surehold.grasping.object.distance_field import cache_folder, content_hash
 from surehold.grasping.object.model import OBJECTS, GraspObject
 from surehold.grasping.poses import MODES, Pose, default_pose, facet_axes
 from surehold.grasping.simulator import Simulator
+from surehold.store.atomic import replacing
 
 __all__ = ["GraspDefault", "default_facet", "grasp_default", "search_default"]
 
@@ -160,9 +160,8 @@ def grasp_default(
         known = search_default(Simulator(hand, obj, preshape=simulator.preshape, depth=_DEPTH), mode, progress)
         with suppress(OSError):  # a folder that cannot be written costs time at the next start and nothing else
             path.parent.mkdir(parents=True, exist_ok=True)
-            scratch = path.with_suffix(f".{os.getpid()}.tmp")
-            scratch.write_text(json.dumps(known))
-            scratch.replace(path)
+            with replacing(path) as file:
+                file.write(json.dumps(known).encode())
     return known
 
 

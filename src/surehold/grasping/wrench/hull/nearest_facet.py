@@ -25,7 +25,8 @@ which is consistent however degenerate the wrenches are.
 """
 
 import numpy as np
-from numba import njit
+
+from surehold.store.kernels import njit
 
 __all__ = ["DONE", "FAILED", "FLAT", "OUTSIDE", "SPENT", "expand_nearest"]
 

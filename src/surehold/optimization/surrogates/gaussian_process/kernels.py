@@ -25,9 +25,9 @@ from math import sqrt
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from surehold.errors import unknown_name
+from surehold.store.kernels import njit
 
 __all__ = [
     "KERNELS",

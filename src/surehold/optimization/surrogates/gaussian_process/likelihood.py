@@ -21,10 +21,11 @@ from math import exp, inf, log, pi, sqrt
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numpy.typing import NDArray
 
 from surehold.optimization.surrogates.gaussian_process.kernels import along, correlation_and_factor, self_correlation
+from surehold.store.kernels import njit
 
 __all__ = [
     "Evidence",

@@ -14,7 +14,6 @@ is f(x) itself, so one compiled function serves both.
 """
 
 import numpy as np
-from numba import njit
 
 from surehold.optimization.surrogates.gaussian_process.kernels import (
     along,
@@ -29,6 +28,7 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import (
     solve_lower,
     solve_lower_transposed,
 )
+from surehold.store.kernels import njit
 
 __all__ = ["average", "factorize", "sample"]
 

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from surehold.store.kernels import njit
 
 __all__ = ["Node", "Partition", "Split", "grow", "split_gains"]
 

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 from surehold.optimization.surrogates.gaussian_process.prediction import average
+from surehold.store.kernels import njit
 
 __all__ = ["LeafTable", "average_in_leaves"]
 

@@ -1,0 +1,61 @@
+import os
+
+import pytest
+
+from surehold.errors import InputError
+from surehold.store.atomic import checked_folder, replacing, write_file
+
+
+def test_the_old_content_stays_until_the_new_is_whole(tmp_path):
+    path = tmp_path / "data"
+    write_file(path, "old")
+    with replacing(path) as file:
+        file.write(b"ne")
+        file.flush()
+        assert path.read_text() == "old"
+        file.write(b"w")
+    assert path.read_text() == "new"
+    assert os.listdir(tmp_path) == ["data"]
+
+
+def _fail_half_way(file, failure):
+    file.write(b"half")
+    raise failure
+
+
+@pytest.mark.parametrize("failure", [ValueError, KeyboardInterrupt])
+def test_a_failure_inside_keeps_the_old_content_and_leaves_nothing_behind(tmp_path, failure):
+    path = tmp_path / "data"
+    write_file(path, "old")
+    with pytest.raises(failure), replacing(path) as file:
+        _fail_half_way(file, failure)
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["data"]
+
+
+def test_others_may_read_what_is_written(tmp_path):
+    before = os.umask(0o022)
+    try:
+        write_file(tmp_path / "data", b"\x00\xff")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "data").stat().st_mode & 0o777 == 0o644
+    assert (tmp_path / "data").read_bytes() == b"\x00\xff"
+
+
+def test_a_failed_write_keeps_what_was_there(tmp_path):
+    target = tmp_path / "report.html"
+    target.mkdir()
+    with pytest.raises(InputError, match="cannot be written"):
+        write_file(target, "new")
+    assert list(tmp_path.iterdir()) == [target]
+    with pytest.raises(InputError, match="cannot be written"):
+        write_file(tmp_path / "missing" / "x", "new")
+
+
+def test_a_folder_is_made_or_refused(tmp_path):
+    assert checked_folder(tmp_path / "a" / "b").is_dir()
+    (tmp_path / "taken").write_text("a file")
+    for place in (tmp_path / "taken", tmp_path / "taken" / "below"):
+        with pytest.raises(InputError, match="choose another"):
+            checked_folder(place)

@@ -1,0 +1,90 @@
+"""The core works alone, and each part says in one line what it needs."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from surehold.extras import EXTRAS, MODULES
+
+PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
+BEYOND_THE_CORE = sorted({MODULES.get(name, name) for names in EXTRAS.values() for name in names})
+
+#: every module beyond the core is as if it were not installed
+BLOCKED = f"import sys\nfor name in {BEYOND_THE_CORE}: sys.modules[name] = None\n"
+
+CORE = """
+import surehold as sh
+
+box = sh.Box({"a": (0.0, 1.0), "b": (-1.0, 1.0)})
+noise = sh.InputNoise.unit(0.05)
+for surrogate in ("gp", "tgp"):
+    optimizer = sh.Optimizer(box, input_noise=noise, surrogate=surrogate, n_initial=4, seed=0)
+    for _ in range(6):
+        x = optimizer.ask()
+        optimizer.tell(x, -float((x**2).sum()))
+    assert box.contains(optimizer.recommend().x)
+assert sh.maximize(lambda x: -abs(float(x[0])), box, 6, n_initial=5).recommendation.n == 6
+assert sh.problems.RKHS()([0.5]) is not None
+print("works")
+"""
+
+DOORS = {
+    "grasp": "surehold.problems.Grasp",
+    "study": "surehold.Sampler",
+    "report": "import surehold.reports",
+    "campaign": "import surehold.campaigns",
+    "sklearn": "import surehold.sklearn",
+}
+
+
+def python(code):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=300)
+
+
+def test_the_core_works_alone():
+    done = python(BLOCKED + CORE)
+    assert done.stdout == "works\n", done.stderr
+
+
+@pytest.mark.parametrize("extra", DOORS)
+def test_a_part_whose_extra_is_missing_names_the_command(extra):
+    done = python(f"{BLOCKED}import surehold\n{DOORS[extra]}")
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("surehold.extras.MissingExtra: surehold.")
+    assert last.endswith(f"run: pip install 'surehold[{extra}]'.")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "blocked", "extra"),
+    [
+        ("", ["typer"], "cli"),
+        ("grasp mug", ["trimesh"], "grasp"),
+        ("maximize rkhs", ["matplotlib"], "report"),
+        ("campaign list", ["joblib"], "campaign"),
+        ("study status nothing", ["optuna"], "study"),
+    ],
+)
+def test_the_command_line_says_it_in_one_line(arguments, blocked, extra):
+    code = f"import sys\nfor name in {blocked}: sys.modules[name] = None\n"
+    done = python(f"{code}from surehold.cli import main\nmain({arguments.split()})")
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.endswith(f"pip install 'surehold[{extra}]'.\n")
+    assert done.stderr.count("\n") == 1
+
+
+def test_the_packages_of_an_extra_are_those_of_the_project_file():
+    """What an extra takes from another one is asked for at that one's door."""
+    for extra, names in EXTRAS.items():
+        listed = {re.match(r"[\w-]+", line)[0] for line in PROJECT["optional-dependencies"][extra]}
+        assert set(names) == listed - {"surehold"}, extra
+
+
+def test_all_is_all():
+    extras = set(PROJECT["optional-dependencies"]) - {"all", "dev", "peers"}
+    assert extras == set(EXTRAS)
+    assert PROJECT["optional-dependencies"]["all"] == [f"surehold[{','.join(sorted(extras))}]"]
