@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from surehold.optimization.recommendation import Recommendation
     from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
     from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
+    from surehold.optimization.trials import AskedTrial
     from surehold.studies.sampler import Sampler
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "AskedTrial",
     "Box",
     "GaussianProcess",
     "InputError",
@@ -42,6 +44,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "AskedTrial": "optimization.trials",
     "Box": "optimization.box",
     "GaussianProcess": "optimization.surrogates.gaussian_process.model",
     "InputError": "errors",

@@ -5,7 +5,7 @@ Legend
     t   trials told, failed ones included
 """
 
-from typing import Final, Literal, cast
+from typing import Any, Final, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +32,7 @@ from surehold.optimization.surrogates.noisy_inputs import (
     noise_from_repeats,
 )
 from surehold.optimization.surrogates.protocol import Posterior, Surrogate, mixture
-from surehold.optimization.trials import Trials, same
+from surehold.optimization.trials import AskedTrial, Trials, same
 
 __all__ = ["Optimizer"]
 
@@ -202,42 +202,77 @@ class Optimizer:
         """Inputs asked for and not told yet, (p, d), in the box's units."""
         return self.box.from_unit(self._trials.pending)
 
-    def tell(
-        self, x: ArrayLike, y: float | None = None, *, failed: bool = False, reached: ArrayLike | None = None
-    ) -> None:
-        """Record the outcome y of a trial at x (d,), or that it gave nothing.
+    @property
+    def reached(self) -> NDArray[np.float64]:
+        """Inputs truly reached (t, d), in the box's units: the commanded ones where nothing else was told."""
+        return self.box.from_unit(self._trials.reached)
 
-        A failed trial counts for the model as the lowest value told so far, so that it is avoided. If x is pending it
-        is so no more; a trial that was never asked for is welcome too. Where the input that was truly reached (d,) is
-        known, the model learns from that one.
+    def tell(
+        self,
+        x: Any,
+        y: float | None = None,
+        *,
+        failed: bool | Literal["rig"] = False,
+        reached: Any = None,
+    ) -> None:
+        """Record the outcome y of a trial at x, or that it gave nothing.
+
+        Parameters
+        ----------
+        x
+            Where: an `AskedTrial`, or the point (d,) in the box's units; a dictionary or a Series of pandas is read by
+            its names. If it is pending it is so no more; a trial that was never asked for is welcome too. A point
+            belongs to the nearest pending trial within 0.01 box widths in every variable, so that a rig may round it;
+            the model learns from the point as it is told. One beyond a bound by no more than the rounding of single
+            precision is on the bound (see `Box.rounding`).
+        y
+            One finite number.
+        failed
+            True: the place gave nothing. The trial counts for the model as the lowest value told so far, so that the
+            place is avoided. "rig": the place is not at fault (a camera hung, a person came in the way). The trial
+            leaves no trace, and its number is asked for again.
+        reached
+            Where the trial truly was, (d,), where that is known; inside of the box or not. The model learns from
+            there; more than 1e6 box widths away counts as 1e6. `recommend` answers inputs inside the box only.
 
         Raises
         ------
         InputError
-            If x or reached has the wrong shape, is not finite or lies outside the box; if y is missing, not finite or
-            not a number; if a failed trial comes with a value. Nothing told before is lost.
+            If x or reached has the wrong shape, other names or is not finite, or x lies outside the box; if an
+            `AskedTrial` has been told before; if y is missing, not finite or not a number; if a failed trial comes with
+            a value. Nothing told before is lost.
         """
         self._trials.tell(x, y, failed, reached)
 
-    def forget(self, x: ArrayLike) -> None:
-        """Drop a pending trial at x (d,) that will never be told; raises InputError if it is not pending."""
+    def forget(self, x: Any) -> None:
+        """Drop a pending trial, an `AskedTrial` or its x (d,), that will never be told; its number is asked for again.
+
+        Raises InputError if it is not pending.
+        """
         self._trials.forget(x)
 
     def restore(
-        self, X: ArrayLike, y: ArrayLike, *, reached: ArrayLike | None = None, pending: ArrayLike | None = None
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        *,
+        reached: ArrayLike | None = None,
+        pending: ArrayLike | None = None,
+        numbers: ArrayLike | None = None,
     ) -> None:
         """Replace all trials by stored ones: X (t, d) with values y (t,), NaN for failed ones, and pending (p, d).
 
-        `reached` (t, d) are the inputs that were truly reached, X where None. What is asked next is what an optimizer
-        asks that was told these trials in this order.
+        `reached` (t, d) are the inputs that were truly reached, X where None. `numbers` (t + p,) are those of the
+        trials, the pending ones last; 0, 1, 2, ... where None. What is asked next is what an optimizer asks that was
+        told these trials in this order.
 
         Raises
         ------
         InputError
-            If shapes do not fit, an input is not finite or lies outside the box, or a value is infinite.
+            If shapes do not fit, an input is not finite, X or pending lie outside the box, or a value is infinite.
         """
         trials = Trials(self.box)
-        trials.restore(X, y, X if reached is None else reached, () if pending is None else pending)
+        trials.restore(X, y, X if reached is None else reached, () if pending is None else pending, numbers)
         if not trials.equal(self._trials):
             self._cache = None
         self._trials = trials
@@ -250,14 +285,33 @@ class Optimizer:
         Points asked for are pending until they are told: further asks keep away from them.
 
         `number` is the number of the (first) trial asked for, 0 for the first of all: its place in the initial design
-        and in the random sequence. By default as many as are told or pending.
+        and in the random sequence. By default the lowest that is free.
         """
-        first = len(self._trials) + len(self._trials.pending) if number is None else _count("number", number, 0)
         if n is None:
-            return self._ask_one(first)
-        return np.array([self._ask_one(first + i) for i in range(_count("n", n, 1))])
+            return self._ask_one(number).x
+        return np.array([trial.x for trial in self._ask(n, number)])
 
-    def _ask_one(self, position: int) -> NDArray[np.float64]:
+    def ask_trial(self, n: int | None = None) -> AskedTrial | list[AskedTrial]:
+        """Ask as `ask` does, for trials that know their numbers: `tell` takes one in place of x.
+
+        However a rig rounds or names its inputs, the answer belongs to the trial that was asked for.
+
+        Examples
+        --------
+        >>> from surehold import Box, Optimizer
+        >>> optimizer = Optimizer(Box({"temperature": (20.0, 120.0)}), seed=0)
+        >>> trial = optimizer.ask_trial()
+        >>> optimizer.tell(trial, 0.7, reached=trial.x.round())
+        >>> len(optimizer.pending)
+        0
+        """
+        return self._ask_one(None) if n is None else self._ask(n, None)
+
+    def _ask(self, n: int, number: int | None) -> list[AskedTrial]:
+        return [self._ask_one(None if number is None else number + i) for i in range(_count("n", n, 1))]
+
+    def _ask_one(self, number: int | None) -> AskedTrial:
+        position = self._trials.next_number if number is None else _count("number", number, 0)
         if position < self.n_initial:
             u = self._design[position]
         elif not self._trials.successful.any():
@@ -266,14 +320,13 @@ class Optimizer:
             with single_threaded():
                 u = self._propose(self._rng(2, position))
         u = self._snapped(u)
-        self._trials.ask(u)
-        return self.box.from_unit(u)
+        return AskedTrial(self._trials.ask(position, u), self.box.from_unit(u))
 
     def _propose(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        told, pending = self._trials.successful, self._trials.pending
+        told, pending = self._trials.eligible, self._trials.pending
         candidates = self._goal.candidates(
             self._posterior(),
-            self._trials.reached[told],
+            self._trials.places[told],
             self._trials.values[told],
             pending,
             self._trials.reached[~told],
@@ -306,8 +359,8 @@ class Optimizer:
         """
         if where not in ("observed", "box"):
             raise unknown_name("place of the recommendation", where, ("observed", "box"))
-        told = self._trials.successful
-        tried, values = self._trials.reached[told], self._trials.values[told]
+        told = self._trials.eligible
+        tried, values = self._trials.places[told], self._trials.values[told]
         with single_threaded():
             posterior = self._posterior()
             if where == "observed":
@@ -326,7 +379,7 @@ class Optimizer:
                 self.box.from_unit(u),
                 observed,
                 (tried[highest], float(values[highest])),
-                len(values),
+                int(self._trials.successful.sum()),
             )
 
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -346,11 +399,11 @@ class Optimizer:
         Of the outcome under the input noise, over the best input tried so far; small where there is little left to
         find. Raises InputError if no trial has given a value yet.
         """
-        told = self._trials.successful
+        told = self._trials.eligible
         with single_threaded():
             posterior = self._posterior()
             return self._goal.promise(
-                posterior, self._trials.reached[told], self._trials.values[told], self._rng(4, len(self._trials))
+                posterior, self._trials.places[told], self._trials.values[told], self._rng(4, len(self._trials))
             )
 
     def estimate_input_noise(self) -> InputNoise:
