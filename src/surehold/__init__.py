@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from surehold.errors import InputError, SureholdError
     from surehold.optimization.acquisition.risk_measures import Risk
     from surehold.optimization.box import Box
-    from surehold.optimization.maximization import Result, Trial, maximize
+    from surehold.optimization.maximization import Result, Trial, maximize, minimize
     from surehold.optimization.noise.input_noise import InputNoise
     from surehold.optimization.noise.quadratures import sigma_points
     from surehold.optimization.optimizer import Optimizer
@@ -39,6 +39,7 @@ __all__ = [
     "Trial",
     "grasping",
     "maximize",
+    "minimize",
     "problems",
     "sigma_points",
 ]
@@ -58,6 +59,7 @@ _HOMES = {
     "TreedGaussianProcess": "optimization.surrogates.treed.model",
     "Trial": "optimization.maximization",
     "maximize": "optimization.maximization",
+    "minimize": "optimization.maximization",
     "sigma_points": "optimization.noise.quadratures",
 }
 

@@ -49,12 +49,23 @@ def test_a_function_that_raises_is_a_failed_trial():
         (np.inf, "inf"),
         ([1.0, 2.0], r"shape \(2,\)"),
         ("good", "ValueError"),
-        (None, ""),
+        (None, "returned None.*lack a return"),
+        (np.ma.masked, "masked"),
     ],
 )
 def test_all_failed(value, words):
+    calls = []
+
+    def failing(x):
+        calls.append(x)
+        return value
+
+    with pytest.raises(SureholdError, match=f"the first 3 trials failed.*{words}.*tolerate_failures=True"):
+        maximize(failing, BOX, n_trials=6)
+    assert len(calls) == 3
     with pytest.raises(SureholdError, match=f"all 6 trials failed.*{words}"):
-        maximize(lambda x: value, BOX, n_trials=6)
+        maximize(failing, BOX, n_trials=6, tolerate_failures=True)
+    assert len(calls) == 9
 
 
 def test_one_number_in_an_array_is_a_number():

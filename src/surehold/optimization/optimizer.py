@@ -5,6 +5,7 @@ Legend
     t   trials told, failed ones included
 """
 
+from collections.abc import Mapping
 from typing import Any, Final, Literal, cast
 
 import numpy as np
@@ -14,8 +15,8 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.acquisition.scales import criterion_name
 from surehold.optimization.box import Box
-from surehold.optimization.lattice import Lattice, LatticePosterior
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.lattice import Lattice, LatticePosterior, with_fixed
+from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.numerics.threads import single_threaded
@@ -32,7 +33,7 @@ from surehold.optimization.surrogates.noisy_inputs import (
     noise_from_repeats,
 )
 from surehold.optimization.surrogates.protocol import Posterior, Surrogate, mixture
-from surehold.optimization.trials import AskedTrial, Trials, same
+from surehold.optimization.trials import AskedTrial, Trials, initial_inputs, number_of, same
 
 __all__ = ["Optimizer"]
 
@@ -42,7 +43,7 @@ _THESIS_REPEATS: Final = 2
 
 
 class Optimizer:
-    """Bayesian optimization by ask and tell; everything is maximized.
+    """Bayesian optimization by ask and tell.
 
     What `ask` returns depends on the settings, the trials told, the pending trials and the seed alone: an optimizer
     rebuilt from stored trials asks the same next point. (The thesis presets continue their chains and do not.)
@@ -51,6 +52,9 @@ class Optimizer:
     ----------
     box
         The search space.
+    direction
+        "maximize" (default) or "minimize". Whatever is told and answered is in the user's own sign; the model, the
+        criteria and `posterior` are of the negated values where the optimizer minimizes.
     input_noise
         How far the reached input strays from the commanded one; None for inputs that are reached exactly.
     surrogate
@@ -64,7 +68,12 @@ class Optimizer:
         (the maximum of a function, or of its outcome, drawn from the posterior). By default "log_ei" without and
         "robust_log_ei" with input noise; in the thesis presets "ei" and "uei".
     n_initial
-        Trials of the initial design; by default 5 a variable, at least 6.
+        Trials of the initial design; by default 5 a variable that is not fixed, at least 6.
+    initial_points
+        Points to be tried first, (i, d) or a list of whatever `tell` takes as x; they count as trials of the initial
+        design, whose rest follows.
+    fixed
+        {name: value} of variables that keep this value in every trial.
     design
         "latin_hypercube" (default), "sobol" or "uniform".
     seed
@@ -113,10 +122,13 @@ class Optimizer:
         self,
         box: Box,
         *,
+        direction: str = "maximize",
         input_noise: InputNoise | None = None,
         surrogate: str | Surrogate = "gp",
         criterion: str | None = None,
         n_initial: int | None = None,
+        initial_points: Any = None,
+        fixed: Mapping[str, float] | None = None,
         design: str = "latin_hypercube",
         seed: int = 0,
         noise: float | NoiseName = "none",
@@ -133,10 +145,19 @@ class Optimizer:
     ):
         if not isinstance(box, Box):
             raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
+        if direction not in ("maximize", "minimize"):
+            raise unknown_name("direction", direction, ("maximize", "minimize"))
         self.box: Final = box
-        self.input_noise: Final = input_noise
+        self.direction: Final = direction
+        self._sign: Final = 1.0 if direction == "maximize" else -1.0
+        self.input_noise: Final = checked_input_noise(input_noise, box.names)
         self.seed: Final = _count("seed", seed, 0)
-        self.n_initial: Final = _count("n_initial", self.default_n_initial(box) if n_initial is None else n_initial, 1)
+        variables = box.dimension - len(fixed or ())
+        first = initial_inputs(box, initial_points)
+        wanted = self.default_n_initial(box, variables) if n_initial is None else n_initial
+        self.n_initial: Final = max(_count("n_initial", wanted, 1), len(first))
+        if output_range is not None and direction == "minimize":
+            output_range = (-output_range[1], -output_range[0])
         thesis = None if preset is None else thesis_preset(preset)
         self._surrogate: Surrogate = (
             surrogate_named(surrogate, box, input_noise, self.seed, noise, output_range, thesis)
@@ -174,16 +195,20 @@ class Optimizer:
             )
         self._straying = noise_while_exploring and not (isinstance(noise, str) and noise != "none")
         self._known_noise = 0.0 if isinstance(noise, str) else float(noise)
-        self._lattice = lattice
+        self._lattice = with_fixed(lattice, box, fixed)
         rng = np.random.default_rng([self.seed, 0])
-        self._design = initial_design(design, self.n_initial, box.dimension, rng)
+        rest = initial_design(design, max(self.n_initial - len(first), 1), box.dimension, rng)
+        self._design = np.concatenate([first, rest])
         self._trials = Trials(box)
         self._cache: tuple[int, Posterior] | None = None
 
     @staticmethod
-    def default_n_initial(box: Box) -> int:
-        """Return the size of the initial design where none is given: 5 a variable, at least 6."""
-        return max(6, 5 * box.dimension)
+    def default_n_initial(box: Box, variables: int | None = None) -> int:
+        """Return the size of the initial design where none is given: 5 a variable, at least 6.
+
+        `variables` are those that can vary, where the box has others, or several coordinates for one (a choice).
+        """
+        return max(6, 5 * (box.dimension if variables is None else variables))
 
     # --- trials -------------------------------------------------------------------------------------------------
 
@@ -195,7 +220,7 @@ class Optimizer:
     @property
     def y(self) -> NDArray[np.float64]:
         """Values told so far, (t,); NaN for failed trials."""
-        return self._trials.values
+        return self._sign * self._trials.values
 
     @property
     def pending(self) -> NDArray[np.float64]:
@@ -242,7 +267,7 @@ class Optimizer:
             `AskedTrial` has been told before; if y is missing, not finite or not a number; if a failed trial comes with
             a value. Nothing told before is lost.
         """
-        self._trials.tell(x, y, failed, reached)
+        self._trials.tell(x, None if y is None else self._sign * number_of(y), failed, reached)
 
     def forget(self, x: Any) -> None:
         """Drop a pending trial, an `AskedTrial` or its x (d,), that will never be told; its number is asked for again.
@@ -272,7 +297,13 @@ class Optimizer:
             If shapes do not fit, an input is not finite, X or pending lie outside the box, or a value is infinite.
         """
         trials = Trials(self.box)
-        trials.restore(X, y, X if reached is None else reached, () if pending is None else pending, numbers)
+        trials.restore(
+            X,
+            self._sign * np.asarray(y, dtype=np.float64),
+            X if reached is None else reached,
+            () if pending is None else pending,
+            numbers,
+        )
         if not trials.equal(self._trials):
             self._cache = None
         self._trials = trials
@@ -380,6 +411,7 @@ class Optimizer:
                 observed,
                 (tried[highest], float(values[highest])),
                 int(self._trials.successful.sum()),
+                self._sign,
             )
 
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -391,7 +423,7 @@ class Optimizer:
         perturbations = self._goal.accurate if under_noise else Perturbations(exact(self.box.dimension))
         with single_threaded():
             mean, variance = mixture(perturbations.outcome(self._posterior(), U))
-        return mean, np.sqrt(variance)
+        return self._sign * mean, np.sqrt(variance)
 
     def promise(self) -> float:
         """Return the largest improvement that a further input is expected to bring, in the outputs' units.
@@ -428,6 +460,13 @@ class Optimizer:
         """The surrogate conditioned on the trials told so far; inputs in the unit cube."""
         with single_threaded():
             return self._posterior()
+
+    def __repr__(self) -> str:
+        parts = [f"{len(self._trials)} trials", f"{len(self._trials.pending)} pending"]
+        found = self.y[np.isfinite(self.y)]
+        if len(found):
+            parts.append(f"best {self._sign * (self._sign * found).max():.6g}")
+        return f"<Optimizer of {', '.join(self.box.names)} ({self.direction}): {', '.join(parts)}>"
 
     # --- inside -------------------------------------------------------------------------------------------------
 

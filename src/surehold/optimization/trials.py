@@ -16,7 +16,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.points import numbers_of
 
-__all__ = ["ROUNDED", "AskedTrial", "Trials", "same"]
+__all__ = ["ROUNDED", "AskedTrial", "Trials", "initial_inputs", "number_of", "same"]
 
 _SEPARATION: Final = 1e-6  # points closer than this in every coordinate of the unit cube are the same trial
 #: A rig rounds to its resolution: what is told within so many box widths, in every variable, of a pending trial is it.
@@ -139,7 +139,7 @@ class Trials:
             actual = self._anywhere("reached", reached)
         if failed and y is not None:
             raise InputError(f"a failed trial has no value, but y is {y!r}; leave one of the two out.")
-        value = np.nan if failed else _finite(y)
+        value = np.nan if failed else number_of(y)
         if failed != "rig":
             self._commanded.append(commanded)
             self._reached.append(actual)
@@ -257,7 +257,20 @@ class Trials:
             return np.clip(U, -_FARTHEST, _FARTHEST)
 
 
-def _finite(y: Any) -> float:
+def initial_inputs(box: Box, points: Any) -> NDArray[np.float64]:
+    """Return points to be tried first as points (i, d) of the unit cube; raises InputError where one lies outside."""
+    if points is None:
+        return np.empty((0, box.dimension))
+    rows = [box.points(point) for point in points] if isinstance(points, (list, tuple)) else box.points(points)
+    trials = Trials(box)
+    trials.restore(
+        np.reshape(rows, (-1, box.dimension)), np.zeros(len(rows)), np.reshape(rows, (-1, box.dimension)), ()
+    )
+    return trials.commanded
+
+
+def number_of(y: Any) -> float:
+    """Return the value of a trial as a float; raises InputError where it is not one finite number."""
     if y is None:
         raise InputError("the trial has no value; give y, or failed=True for a trial that gave nothing.")
     try:

@@ -29,7 +29,7 @@ from optuna.distributions import (
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.lattice import Lattice
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
 
 __all__ = ["SearchSpace"]
 
@@ -113,6 +113,11 @@ class SearchSpace:
         self.lattice: Final = None if smooth.all() else Lattice(self._snap, smooth)
 
     @property
+    def variables(self) -> int:
+        """Number of parameters that can vary: a choice is one, however many coordinates it has."""
+        return len(self._numeric) + len(self._choices)
+
+    @property
     def numbers(self) -> Box | None:
         """The box of the parameters that are numbers and can vary: those that input noise is given for."""
         return Box({numeric.name: numeric.bounds() for _, numeric in self._numeric}) if self._numeric else None
@@ -176,6 +181,7 @@ class SearchSpace:
         InputError
             If its names are not those of the numbers, or choices meet noise that is correlated or varies.
         """
+        noise = checked_input_noise(noise, tuple(numeric.name for _, numeric in self._numeric))
         if noise is None or self.box is None or not self._choices:
             return noise
         numbers = self.numbers

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 
-__all__ = ["InputNoise"]
+__all__ = ["InputNoise", "checked_input_noise"]
 
 
 class InputNoise:
@@ -189,6 +189,22 @@ class InputNoise:
         if self._covariance is not None:
             return f"InputNoise(covariance={self._covariance.tolist()})"
         return f"InputNoise({self._deviations})"
+
+
+def checked_input_noise(value: Any, names: tuple[str, ...]) -> InputNoise | None:
+    """Return input noise as it was given; raises InputError if it is none. `names` are those of the variables."""
+    if value is None or isinstance(value, InputNoise):
+        return value
+    shown = f"input_noise is {' '.join(repr(value).split())}"
+    if isinstance(value, Mapping):
+        raise InputError(f"{shown}; give sh.InputNoise({dict(value)!r}).")
+    if np.ndim(value) == 0 and isinstance(value, (int, float, np.number)):
+        named = ", ".join(f"{name!r}: {value:g}" for name in names)
+        raise InputError(
+            f"{shown}, and it does not say of what: give sh.InputNoise.unit({value:g}) for that share of every "
+            f"variable's range, or sh.InputNoise({{{named}}}) for standard deviations in the variables' own units."
+        )
+    raise InputError(f"{shown}; give sh.InputNoise({{name: standard deviation}}) for {', '.join(names)}, or None.")
 
 
 def root_of(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
