@@ -11,9 +11,9 @@ from typing import Any, Final, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.defaults import DESIGN_LEAST, DESIGN_PER_VARIABLE, KAPPA, OUTCOME_EXPONENT
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
-from surehold.optimization.acquisition.scales import criterion_name
 from surehold.optimization.box import Box
 from surehold.optimization.lattice import Lattice, LatticePosterior, with_fixed
 from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
@@ -21,9 +21,12 @@ from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.recommendation import Recommendation, recommendation
-from surehold.optimization.strategy.goal import Goal
 from surehold.optimization.strategy.initial_design import design as initial_design
-from surehold.optimization.strategy.presets import thesis_preset
+from surehold.optimization.strategy.named import strategy_named
+from surehold.optimization.strategy.promise import promise
+from surehold.optimization.strategy.ranking import History, Ranking
+from surehold.optimization.strategy.thesis import thesis_preset
+from surehold.optimization.strategy.trust_region import TrustRegion
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.surrogates.named import surrogate_named
 from surehold.optimization.surrogates.noisy_inputs import (
@@ -36,10 +39,6 @@ from surehold.optimization.surrogates.protocol import Posterior, Surrogate, mixt
 from surehold.optimization.trials import AskedTrial, Trials, initial_inputs, number_of, same
 
 __all__ = ["Optimizer"]
-
-# How often an exact trial may be repeated in the thesis presets. The original repeats a point twenty times before it
-# jumps to a random one, which cost it whole runs.
-_THESIS_REPEATS: Final = 2
 
 
 class Optimizer:
@@ -136,7 +135,7 @@ class Optimizer:
         quadrature: str | None = None,
         k: float = 1.0,
         border: str = "extend",
-        kappa: float = 2.0,
+        kappa: float = KAPPA,
         risk: str | Risk = "mean",
         noise_while_exploring: bool = False,
         trust_region: bool = False,
@@ -164,30 +163,20 @@ class Optimizer:
             if isinstance(surrogate, str)
             else surrogate
         )
-        if criterion is None:
-            criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + (input_noise is not None)]
-        name = criterion_name(criterion)
-        if not np.isfinite(kappa):
-            raise InputError(f"kappa is {kappa!r}; give a finite number of standard deviations.")
-        risk = Risk(risk) if isinstance(risk, str) else risk
-        if input_noise is None and (name.scale != "exact" or risk.name != "mean"):
-            what = f"risk '{risk.name}'" if risk.name != "mean" else f"criterion '{criterion}'"
-            raise InputError(f"{what} needs input noise; give input_noise=.")
         if input_noise is not None:
             input_noise.warn_if_larger_than(box)
-        many = name.scale == "robust" or risk.name != "mean"
-        rule = quadrature or ("quasi_monte_carlo" if many else "unscented")
-        self._goal = Goal(
-            criterion=name,
-            accurate=Perturbations.of(input_noise, box, rule, border, k=k),
-            coarse=Perturbations.of(input_noise, box, "unscented", border),
-            risk=risk,
-            margin=0.0 if thesis is None else thesis.margin,
-            kappa=float(kappa),
+        self._strategy = strategy_named(
+            criterion,
+            Risk(risk) if isinstance(risk, str) else risk,
+            box,
+            input_noise,
+            quadrature=quadrature,
+            k=k,
+            border=border,
+            kappa=kappa,
             noisy=(noise != "none" and noise != 0.0) or noise_while_exploring,
-            trust_region=trust_region,
-            n_initial=self.n_initial,
-            thesis=thesis is not None,
+            trust_region=TrustRegion(self.n_initial) if trust_region else None,
+            thesis=thesis,
         )
         if noise_while_exploring and (input_noise is None or thesis is not None or surrogate not in ("gp", "tgp")):
             raise InputError(
@@ -204,11 +193,11 @@ class Optimizer:
 
     @staticmethod
     def default_n_initial(box: Box, variables: int | None = None) -> int:
-        """Return the size of the initial design where none is given: 5 a variable, at least 6.
+        """Return the size of the initial design where none is given: 5 for each variable, at least 6.
 
         `variables` are those that can vary, where the box has others, or several coordinates for one (a choice).
         """
-        return max(6, 5 * (box.dimension if variables is None else variables))
+        return max(DESIGN_LEAST, DESIGN_PER_VARIABLE * (box.dimension if variables is None else variables))
 
     # --- trials -------------------------------------------------------------------------------------------------
 
@@ -344,7 +333,7 @@ class Optimizer:
     def _ask_one(self, number: int | None) -> AskedTrial:
         position = self._trials.next_number if number is None else _count("number", number, 0)
         if position < self.n_initial:
-            u = self._design[position]
+            u = self._design[self._unused_place(position) if number is None else position]
         elif not self._trials.successful.any():
             u = self._rng(2, position).random(self.box.dimension)  # every trial failed or is pending: keep covering
         else:
@@ -353,23 +342,25 @@ class Optimizer:
         u = self._snapped(u)
         return AskedTrial(self._trials.ask(position, u), self.box.from_unit(u))
 
+    def _unused_place(self, position: int) -> int:
+        """Return the place in the design to ask for next: the position, or the first unused one after a `forget`."""
+        design = self._snapped(self._design)
+        trials = np.concatenate([self._trials.commanded, self._trials.pending])
+
+        def unused(place: int) -> bool:  # on a lattice several places may be one point
+            return np.count_nonzero(same(design[place], trials)) <= np.count_nonzero(
+                same(design[place], design[:place])
+            )
+
+        return position if unused(position) else next(filter(unused, range(self.n_initial)), position)
+
     def _propose(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        told, pending = self._trials.eligible, self._trials.pending
-        candidates = self._goal.candidates(
-            self._posterior(),
-            self._trials.places[told],
-            self._trials.values[told],
-            pending,
-            self._trials.reached[~told],
-            rng,
-        )
-        candidates = self._snapped(candidates)
-        if self._goal.noisy:
+        candidates = self._snapped(self._strategy.candidates(self._posterior(), self._history, rng))
+        if self._ranking.noisy:
             return candidates[0]
-        repeats = _THESIS_REPEATS if self._goal.thesis else 0
-        tried = np.concatenate([self._trials.commanded, pending])
-        for candidate in candidates[:1] if self._goal.thesis else candidates:
-            if np.count_nonzero(same(candidate, tried)) <= repeats:
+        tried = np.concatenate([self._trials.commanded, self._trials.pending])
+        for candidate in candidates:
+            if np.count_nonzero(same(candidate, tried)) <= self._strategy.repeats:
                 return candidate
         return rng.random(self.box.dimension)  # every candidate has been tried already
 
@@ -390,26 +381,27 @@ class Optimizer:
         """
         if where not in ("observed", "box"):
             raise unknown_name("place of the recommendation", where, ("observed", "box"))
-        told = self._trials.eligible
-        tried, values = self._trials.places[told], self._trials.values[told]
+        history, ranking = self._history, self._ranking
         with single_threaded():
             posterior = self._posterior()
             if where == "observed":
-                index = int(self._goal.rank(posterior, tried, values)[0])
-                u, observed = tried[index], float(values[index])
+                index = int(ranking.order(posterior, history.tried, history.observed)[0])
+                u, observed = history.tried[index], float(history.observed[index])
             else:
-                u, observed = self._snapped(self._goal.best(posterior, tried, self._rng(3, len(self._trials)))), np.nan
-            border = self._goal.accurate.border
-            reached = Perturbations.of(self.input_noise, self.box, "quasi_monte_carlo", border, exponent=7)
-            highest = int(np.argmax(values))
+                rng = self._rng(3, len(self._trials))
+                u, observed = self._snapped(ranking.best(posterior, history.tried, rng)), np.nan
+            reached = Perturbations.of(
+                self.input_noise, self.box, "quasi_monte_carlo", ranking.accurate.border, exponent=OUTCOME_EXPONENT
+            )
+            highest = int(np.argmax(history.observed))
             return recommendation(
                 posterior,
                 reached,
-                self._goal.coarse,
+                ranking.coarse,
                 u,
                 self.box.from_unit(u),
                 observed,
-                (tried[highest], float(values[highest])),
+                (history.tried[highest], float(history.observed[highest])),
                 int(self._trials.successful.sum()),
                 self._sign,
             )
@@ -420,7 +412,7 @@ class Optimizer:
         With `under_noise`, of the outcome averaged over the input noise instead.
         """
         U = np.atleast_2d(self.box.to_unit(X))
-        perturbations = self._goal.accurate if under_noise else Perturbations(exact(self.box.dimension))
+        perturbations = self._ranking.accurate if under_noise else Perturbations(exact(self.box.dimension))
         with single_threaded():
             mean, variance = mixture(perturbations.outcome(self._posterior(), U))
         return self._sign * mean, np.sqrt(variance)
@@ -431,12 +423,8 @@ class Optimizer:
         Of the outcome under the input noise, over the best input tried so far; small where there is little left to
         find. Raises InputError if no trial has given a value yet.
         """
-        told = self._trials.eligible
         with single_threaded():
-            posterior = self._posterior()
-            return self._goal.promise(
-                posterior, self._trials.places[told], self._trials.values[told], self._rng(4, len(self._trials))
-            )
+            return promise(self._ranking, self._posterior(), self._history, self._rng(4, len(self._trials)))
 
     def estimate_input_noise(self) -> InputNoise:
         """Return the input noise that the trials told so far show.
@@ -470,15 +458,26 @@ class Optimizer:
 
     # --- inside -------------------------------------------------------------------------------------------------
 
+    @property
+    def _ranking(self) -> Ranking:
+        return self._strategy.ranking
+
+    @property
+    def _history(self) -> History:
+        told = self._trials.eligible  # those that reached a place outside of the box are no answer, as failed ones
+        return History(
+            self._trials.places[told], self._trials.values[told], self._trials.reached[~told], self._trials.pending
+        )
+
     def _posterior(self) -> Posterior:
         t = len(self._trials)
         if not self._trials.successful.any():
             raise InputError("no trial has given a value yet; tell the outcome of at least one.")
         if self._cache is not None and self._cache[0] == t:
             return self._cache[1]
-        previous = self._cache[1] if self._goal.thesis and self._cache is not None else None
-        stream = t if self._goal.thesis else 0  # one stream for all: what was learnt from some trials stays as it was
-        rng = self._rng(1, stream)
+        continues = self._strategy.continues_chains
+        previous = self._cache[1] if continues and self._cache is not None else None
+        rng = self._rng(1, t if continues else 0)  # else one stream for all: what some trials taught stays as it was
         if self._straying and self.input_noise is not None:
             roots = self.input_noise.unit_roots(self.box, self._trials.commanded).copy()
             roots[self._trials.reported] = 0.0
