@@ -5,6 +5,7 @@ Legend
     t   trials told, failed ones included
 """
 
+import os
 from collections.abc import Mapping
 from typing import Any, Final, Literal, cast
 
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.defaults import DESIGN_LEAST, DESIGN_PER_VARIABLE, KAPPA, OUTCOME_EXPONENT
 from surehold.errors import InputError, unknown_name
+from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.lattice import Lattice, LatticePosterior, with_fixed
@@ -142,6 +144,7 @@ class Optimizer:
         preset: str | None = None,
         lattice: Lattice | None = None,
     ):
+        given = {name: value for name, value in locals().items() if name not in ("self", "box")}
         if not isinstance(box, Box):
             raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
         if direction not in ("maximize", "minimize"):
@@ -153,6 +156,7 @@ class Optimizer:
         self.seed: Final = _count("seed", seed, 0)
         variables = box.dimension - len(fixed or ())
         first = initial_inputs(box, initial_points)
+        self._settings = given | {"initial_points": None if initial_points is None else box.from_unit(first).tolist()}
         wanted = self.default_n_initial(box, variables) if n_initial is None else n_initial
         self.n_initial: Final = max(_count("n_initial", wanted, 1), len(first))
         if output_range is not None and direction == "minimize":
@@ -296,6 +300,42 @@ class Optimizer:
         if not trials.equal(self._trials):
             self._cache = None
         self._trials = trials
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write settings and trials, pending ones included, into a JSON file, for `load`.
+
+        Raises InputError where it cannot be written.
+        """
+        saving.write(path, self.box, self._settings, self._trials)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], **settings: Any) -> "Optimizer":
+        """Return the optimizer that `save` has written: it asks and recommends what that one would.
+
+        Settings that are given replace stored ones; those that a file cannot hold must be: a surrogate that is an
+        object, a lattice, input noise that varies. (The chains of the thesis presets start anew.)
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read or holds no optimizer, or such a setting is missing.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from surehold import Box, Optimizer
+        >>> optimizer = Optimizer(Box({"x": (0.0, 1.0)}), seed=3)
+        >>> optimizer.tell(optimizer.ask(), 0.5)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     optimizer.save(f"{folder}/run.json")
+        ...     again = Optimizer.load(f"{folder}/run.json")
+        >>> bool(again.ask() == optimizer.ask())
+        True
+        """
+        box, found, trials = saving.read(path, settings)
+        optimizer = cls(box, **found)
+        optimizer._trials = trials
+        return optimizer
 
     # --- ask ----------------------------------------------------------------------------------------------------
 

@@ -153,21 +153,30 @@ class Trials:
     ) -> None:
         """Take over stored trials; see `Optimizer.restore`. Nothing is taken over where an argument is bad."""
         commanded, waiting = self._all("X", X, inside=True), self._all("pending", pending, inside=True)
-        actual = self._all("reached", reached, inside=False)
+        self.restore_cube(commanded, y, self._all("reached", reached, inside=False), waiting, numbers)
+
+    def restore_cube(
+        self, commanded: ArrayLike, y: ArrayLike, reached: ArrayLike, pending: ArrayLike, numbers: ArrayLike | None
+    ) -> None:
+        """Take over trials whose inputs are points of the unit cube, as they are."""
+        d = self._box.dimension
+        inputs, actual, waiting = (
+            np.asarray(points, dtype=np.float64).reshape(-1, d) for points in (commanded, reached, pending)
+        )
         values = np.asarray(y, dtype=np.float64)
-        if values.shape != (len(commanded),) or len(actual) != len(commanded):
+        if values.shape != (len(inputs),) or len(actual) != len(inputs):
             raise InputError(
-                f"y has shape {values.shape} and reached {len(actual)} rows, but X has {len(commanded)} rows; give one "
+                f"y has shape {values.shape} and reached {len(actual)} rows, but X has {len(inputs)} rows; give one "
                 "value and one reached input a trial."
             )
         if np.isinf(values).any():
             raise InputError(f"y holds infinity at row {int(np.argmax(np.isinf(values)))}; give NaN for failed trials.")
-        total = len(commanded) + len(waiting)
-        given = np.arange(total) if numbers is None else np.asarray(numbers)
+        total = len(inputs) + len(waiting)
+        given = np.arange(total) if numbers is None or total == 0 else np.asarray(numbers)
         whole = given.shape == (total,) and given.dtype.kind in "iu" and np.all(given >= 0)
         if not whole or len(np.unique(given)) < total:
             raise InputError(f"numbers are {numbers!r}; give {total} different whole numbers, those pending last.")
-        self._commanded, self._reached = list(commanded), list(actual)
+        self._commanded, self._reached = list(inputs), list(actual)
         self._values, self._numbers = values.tolist(), given[: len(values)].tolist()
         self._pending = dict(zip(given[len(values) :].tolist(), waiting, strict=True))
 

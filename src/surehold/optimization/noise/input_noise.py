@@ -99,6 +99,23 @@ class InputNoise:
         noise.bounded = False
         return noise
 
+    def to_json(self) -> dict[str, Any]:
+        """Return constant noise as plain data, for `from_json`; raises InputError for noise that varies."""
+        if self._function is not None:
+            raise InputError(f"{self!r} is a function, which plain data cannot hold; give constant noise.")
+        covariance = None if self._covariance is None else self._covariance.tolist()
+        data = {"standard_deviations": self._deviations, "covariance": covariance, "unit": self._unit}
+        return {name: value for name, value in data.items() if value is not None} | {"bounded": self.bounded}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "InputNoise":
+        """Return the noise that `to_json` described."""
+        if "unit" in data:
+            return cls.unit(data["unit"])
+        noise = cls(data.get("standard_deviations"), covariance=data.get("covariance"))
+        noise.bounded = bool(data["bounded"])
+        return noise
+
     def unit_covariance(self, box: Box, x: ArrayLike | None = None) -> NDArray[np.float64]:
         """Return the covariance (d, d) in the unit cube of `box`.
 
