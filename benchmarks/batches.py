@@ -23,13 +23,13 @@ from threadpoolctl import threadpool_limits
 import surehold as sh
 from benchmarks.best_observed import BUDGETS, problem_named, share_reached
 from surehold.optimization.acquisition.scales import Acquisition
-from surehold.optimization.strategy.goal import Goal
+from surehold.optimization.strategy.ranking import Ranking
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 
 BATCH = 4
 
 
-def no_rise(self, posterior, pending):
+def no_rise(self, posterior, pending, scale):
     return -np.inf
 
 
@@ -65,7 +65,7 @@ def fading(self, U, gradient):
 def patches(method):
     process = GaussianProcessPosterior
     if method == "variance only":
-        return [patch.object(Goal, "_believed", no_rise)]
+        return [patch.object(Ranking, "believed", no_rise)]
     if method == "drawn":
         own = process.with_pending
         return [
@@ -76,7 +76,7 @@ def patches(method):
         own = Acquisition._evaluate
         return [
             patch.object(process, "with_pending", kept),
-            patch.object(Goal, "_believed", no_rise),
+            patch.object(Ranking, "believed", no_rise),
             patch.object(Acquisition, "evaluate_without_penalty", own, create=True),
             patch.object(Acquisition, "_evaluate", fading),
         ]

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 
 import surehold as sh
 from surehold.campaigns.peers import installed_peers
-from surehold.optimization.strategy import goal
+from surehold.optimization.strategy import expected_improvement
 from surehold.problems.robust import ROBUST, RobustProblem, robust_problem
 
 THESIS = ("rkhs 0.01", "rkhs 0.02", "gm 0.1", "gm 0.05", "gm 0.02", "gm 0.01")
@@ -140,15 +140,15 @@ def main():
         reference = None
         for method in arguments.methods:
             start = time.process_time()
-            own = goal.Goal._looks
+            own = expected_improvement.where_to_look
             if method == "no where to look":
-                goal.Goal._looks = lambda self, posterior, u: u[None, :]
+                expected_improvement.where_to_look = lambda posterior, u, *perturbations: u[None, :]
             with threadpool_limits(1):
                 runs = [
                     run(problem, method, BUDGETS[problem.function.box.dimension], seed)
                     for seed in range(arguments.seeds)
                 ]
-            goal.Goal._looks = own
+            expected_improvement.where_to_look = own
             seconds = (time.process_time() - start) / arguments.seeds
             values = np.array([np.asarray(problem.function.expectation(answers, problem.noise)) for answers, _ in runs])
             regret = 100.0 * (best - values) / best

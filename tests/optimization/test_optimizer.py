@@ -4,10 +4,11 @@ import pytest
 from surehold.errors import InputError
 from surehold.optimization.acquisition.scales import CRITERIA
 from surehold.optimization.box import Box
+from surehold.optimization.lattice import Lattice
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.strategy.initial_design import design
-from surehold.optimization.strategy.presets import THESIS
+from surehold.optimization.strategy.thesis import PRESETS
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.problems import GM
@@ -254,7 +255,7 @@ def test_a_flat_start_with_one_later_peak():
     assert optimizer.y.max() > 0.99
 
 
-@pytest.mark.parametrize("preset", THESIS)
+@pytest.mark.parametrize("preset", PRESETS)
 def test_presets_run(preset):
     optimizer = run(9, seed=13, preset=preset, n_initial=6, input_noise=NOISE)
     assert np.isfinite(optimizer.recommend().mean)
@@ -274,6 +275,12 @@ def test_a_surrogate_of_ones_own():
         ({"criterion": "uei"}, "needs input noise"),
         ({"risk": "cvar"}, "needs input noise"),
         ({"risk": "cvarr", "input_noise": NOISE}, "did you mean 'cvar'"),
+        ({"risk": "cvar", "input_noise": NOISE, "quadrature": "scaled_unscented"}, "quadrature 'scaled_unscented' has"),
+        ({"risk": "var", "input_noise": NOISE, "quadrature": "unscented", "k": -1.0}, "quadrature 'unscented' has"),
+        ({"criterion": "upi", "input_noise": NOISE}, "criterion 'upi' is unknown"),
+        ({"preset": "thesis", "criterion": "thompson"}, "in another way than the thesis"),
+        ({"preset": "thesis", "risk": "cvar", "input_noise": NOISE}, "in another way than the thesis"),
+        ({"preset": "thesis", "trust_region": True}, "in another way than the thesis"),
         ({"design": "grid"}, "initial design"),
         ({"n_initial": 0}, "n_initial"),
         ({"n_initial": 2.5}, "n_initial"),
@@ -326,7 +333,7 @@ def test_bad_trials_lose_nothing(arguments, words):
     with pytest.raises(InputError):
         optimizer.tell([0.0, 5.0], 1.0, failed=True)
     with pytest.raises(InputError, match="reached"):
-        optimizer.tell([0.0, 5.0], 1.0, reached=[9.0, 9.0])
+        optimizer.tell([0.0, 5.0], 1.0, reached=[9.0, np.inf])
     assert optimizer.y.tolist() == [1.0]
     np.testing.assert_allclose(optimizer.pending, [waiting])
 
@@ -372,6 +379,27 @@ def test_a_restored_optimizer_is_the_one_that_was_told():
     restored.restore(told.X[:8], told.y[:8])
     assert len(restored.y) == 8
     assert np.isnan(restored.y[4])
+
+
+@pytest.mark.parametrize("lost", [0, 2, 5])
+def test_a_forgotten_place_of_the_design_is_asked_for_again(lost):
+    optimizer = Optimizer(Box.unit(2), seed=0, n_initial=6)
+    points = optimizer.ask(6)
+    optimizer.forget(points[lost])
+    assert np.array_equal(optimizer.ask(), points[lost]), "another point of the design is asked for twice"
+    early = Optimizer(Box.unit(2), seed=0, n_initial=6)
+    early.ask(3)
+    early.forget(points[0])
+    early.tell(points[1], 1.0)
+    assert {tuple(x) for x in early.ask(4)} == {tuple(x) for x in points[[0, 3, 4, 5]]}
+
+
+def test_places_of_the_design_that_are_the_same_after_rounding_are_all_asked_for():
+    """Of a design on a lattice several places may coincide; none of them is skipped."""
+    lattice = Lattice(np.round, np.zeros(1, dtype=np.bool_))
+    optimizer = Optimizer(Box.unit(1), seed=0, n_initial=6, lattice=lattice)
+    design = Optimizer(Box.unit(1), seed=0, n_initial=6).ask(6)
+    assert np.array_equal(optimizer.ask(6), np.round(design))
 
 
 def test_the_number_of_a_trial_is_its_place_in_the_design():

@@ -13,7 +13,8 @@ from surehold.campaigns.plan_file import load_plan
 from surehold.campaigns.problem_setup import SimoxGrasp, build_problem
 from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.strategy.presets import TreedSettings, thesis_preset
+from surehold.optimization.strategy.presets import TreedSettings
+from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.surrogates.protocol import Posterior, mixture
 from surehold.problems.synthetic import synthetic_function
 from surehold.reports import gather

@@ -16,7 +16,8 @@ from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.strategy.presets import TREED, TreedSettings, thesis_preset
+from surehold.optimization.strategy.presets import TREED, TreedSettings
+from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.named import SURROGATES
 

@@ -4,7 +4,7 @@ The outcome of one execution is a mixture of normals: one for each particle of t
 with the posterior mean and standard deviation there.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -59,28 +59,45 @@ class Outcome:
         return 0.5 * (low + high)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recommendation:
-    """The input to use, and what to expect of it when it is perturbed."""
+    """The input to use, and what to expect of it when it is perturbed; values in the sign in which they were told.
+
+    Attributes
+    ----------
+    x : (d,)
+        In the box's units.
+    mean
+        Expected outcome under the input noise.
+    std
+        Standard deviation of one outcome: input noise and what the model does not know together.
+    quantile
+        The value that 19 of 20 outcomes are better than: 95 % exceed it, or, where the optimizer minimizes, stay below.
+    observed
+        Value that was told at x; NaN where x was never tried.
+    n
+        Trials with a value that the recommendation rests on.
+    outcome_std
+        Standard deviation, over the input noise, of the model's mean: the risk left to take; unscented variance (4.1).
+    refused
+        Why the best observed trial was not recommended; empty where it was.
+    outcome : Outcome
+        Distribution of one outcome.
+    """
 
     x: NDArray[np.float64]
-    """(d,), in the box's units"""
     mean: float
-    """expected outcome under the input noise"""
     std: float
-    """standard deviation of one outcome: input noise and what the model does not know together"""
     quantile: float
-    """value that 95 % of outcomes exceed"""
     observed: float
-    """value that was told at x; NaN where x was never tried"""
     n: int
-    """trials with a value that the recommendation rests on"""
     outcome_std: float
-    """standard deviation, over the input noise, of the model's mean: the risk left to take; unscented variance (4.1)"""
     refused: str
-    """why the highest observed trial was not recommended; empty where it was"""
-    outcome: Outcome = field(repr=False)
-    """distribution of one outcome"""
+    outcome: Outcome
+
+    def __repr__(self) -> str:
+        x = np.array2string(self.x, precision=6, separator=", ")
+        return f"Recommendation(x={x}, mean={self.mean:.6g}, std={self.std:.3g}, quantile={self.quantile:.6g})"
 
     def probability_below(self, value: float) -> float:
         """Return the probability that the next execution gives less than `value`."""
@@ -102,8 +119,12 @@ def recommendation(
     observed: float,
     highest: tuple[NDArray[np.float64], float],
     n: int,
+    sign: float = 1.0,
 ) -> Recommendation:
-    """Describe u (d,) of the unit cube, x in the box's units; `highest` is the best observed trial and its value."""
+    """Describe u (d,) of the unit cube, x in the box's units; `highest` is the best observed trial and its value.
+
+    `sign` is that of the values in which the answer is given: -1 where what was told has been turned over.
+    """
     outcome = outcome_of(posterior, reached, u)
     moments, _ = sigma_points.spread(posterior, u[None, :])
     means, weights = moments.mean.mean(axis=0), sigma_points.quadrature.weights
@@ -113,19 +134,21 @@ def recommendation(
     refused = ""
     if np.any(np.abs(highest[0] - u) > 1e-6):
         other = outcome_of(posterior, reached, highest[0])
+        best, worse = ("highest", "less") if sign > 0.0 else ("lowest", "more")
         refused = (
-            f"The highest observed trial gave {highest[1]:.4g}, but under the noise {other.mean:.4g} is expected, "
-            f"and less than {other.quantile(_LEVEL):.4g} once in twenty executions; of the recommended one "
-            f"{outcome.mean:.4g} is expected, and less than {outcome.quantile(_LEVEL):.4g} once in twenty."
+            f"The {best} observed trial gave {sign * highest[1]:.4g}, but under the noise {sign * other.mean:.4g} is "
+            f"expected, and {worse} than {sign * other.quantile(_LEVEL):.4g} once in twenty executions; of the "
+            f"recommended one {sign * outcome.mean:.4g} is expected, and {worse} than "
+            f"{sign * outcome.quantile(_LEVEL):.4g} once in twenty."
         )
     return Recommendation(
         x,
-        outcome.mean,
+        sign * outcome.mean,
         outcome.std,
-        outcome.quantile(_LEVEL),
-        observed,
+        sign * outcome.quantile(_LEVEL),
+        sign * observed,
         n,
         unit * float(np.sqrt(max(variance, 0.0))),
         refused,
-        outcome,
+        Outcome(sign * outcome.means, outcome.stds),
     )

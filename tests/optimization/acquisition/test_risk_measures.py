@@ -13,7 +13,7 @@ from surehold.errors import InputError
 from surehold.optimization.acquisition.criteria import expected_improvement
 from surehold.optimization.acquisition.risk_measures import RISKS, Risk, RiskImprovement, WorstCaseBound
 from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.noise.quadratures import Quadrature, quasi_monte_carlo, sigma_points
+from surehold.optimization.noise.quadratures import Quadrature, quasi_monte_carlo, scaled_sigma_points, sigma_points
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 
 RNG = np.random.default_rng(0)
@@ -138,6 +138,19 @@ def test_many_draws_at_once_are_measured_one_by_one(name):
 def test_bad_input(arguments, message):
     with pytest.raises(InputError, match=message):
         Risk(**arguments)
+
+
+@pytest.mark.parametrize("name", ["mean-std", "var", "cvar"])
+def test_negative_weights_are_refused(name):
+    """The sigma points of a small alpha: they gave a conditional value at risk of 16 for draws between 0 and 1."""
+    draws = np.random.default_rng(0).random((5, 5))
+    weights = scaled_sigma_points(S).weights
+    assert weights.min() < 0.0
+    with pytest.raises(InputError, match=f"risk '{name}' needs weights of 0 or more; choose 'quasi_monte_carlo'"):
+        Risk(name).measure(draws, weights)
+    with pytest.raises(InputError, match="quadrature 'scaled_unscented' has a weight of -"):
+        Risk(name).check_weights(weights, "scaled_unscented")
+    np.testing.assert_allclose(Risk("worst").measure(draws, weights), draws.min(axis=1))
 
 
 # --- of a model that is sure: closed forms of linear functions -------------------------------------------------------

@@ -4,10 +4,10 @@ import pytest
 import surehold as sh
 from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
-from surehold.optimization.acquisition.scales import criterion_name
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
-from surehold.optimization.strategy.goal import Goal
+from surehold.optimization.strategy.ranking import History, Ranking
+from surehold.optimization.strategy.thompson import Thompson
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 
 GM = sh.problems.GM()
@@ -48,11 +48,9 @@ def test_a_point_is_taken_as_often_as_it_is_the_maximum():
     fixed = {"length_scales": [0.15], "signal_variance": 1.0, "standardize": False}
     posterior = GaussianProcess(**fixed).fit(X, y).posterior
     perturbations = Perturbations(exact(1))
-    goal = Goal(criterion_name("thompson"), perturbations, perturbations, Risk(), 0.0, 2.0, True, False, len(X), False)
-    taken = [
-        goal.candidates(posterior, X, y, np.empty((0, 1)), np.empty((0, 1)), np.random.default_rng(seed))[0, 0]
-        for seed in range(300)
-    ]
+    strategy = Thompson(Ranking(perturbations, perturbations, Risk(), noisy=True), exactly=True)
+    history = History(X, y, np.empty((0, 1)), np.empty((0, 1)))
+    taken = [strategy.candidates(posterior, history, np.random.default_rng(seed))[0, 0] for seed in range(300)]
     grid = np.linspace(0.0, 1.0, 201)[:, None]
     mean = posterior.moments(grid).mean[0]
     joint = posterior.sample(grid[None], np.eye(201))[0, 0] - mean  # rows: columns of a root of the covariance

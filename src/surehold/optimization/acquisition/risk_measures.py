@@ -1,11 +1,11 @@
-"""What is asked of the outcome under input noise, where its mean is not what matters.
+"""Risk measures of the outcome under input noise, and the acquisition functions that improve them.
 
 Legend
     draws     joint draws of f at the perturbed points of a query, (..., s)
     weights   w_i of the perturbations, (s,), positive, summing to 1
     rho       risk measure of one draw, larger is better; its distribution over draws is what the model knows of it
     alpha     share of the worst outcomes that counts, in (0, 1)
-    beta      standard deviations taken off the mean, or added to and taken off the model's mean in the worst case
+    beta      standard deviations subtracted from the mean
 """
 
 from dataclasses import dataclass
@@ -14,15 +14,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import RISK_DRAWS
 from surehold.errors import InputError, unknown_name
-from surehold.optimization.maximizer.ascent import by_differences
 from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.numerics.differences import by_differences
 from surehold.optimization.surrogates.protocol import Posterior
 
 __all__ = ["RISKS", "Risk", "RiskImprovement", "WorstCaseBound"]
 
 RISKS: Final = ("mean", "mean-std", "var", "cvar", "worst")
-_DRAWS: Final = 16  # joint draws a particle; common random numbers make the criterion a smooth function of the query
+_UNWEIGHTED: Final = ("mean", "worst")  # measures that a negative weight does no harm
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,17 @@ class Risk:
         if not (np.isfinite(self.beta) and self.beta >= 0.0):
             raise InputError(f"beta is {self.beta!r}; give a finite number of standard deviations, 0 or more.")
 
+    def check_weights(self, weights: NDArray[np.float64], rule: str = "") -> None:
+        """Raise InputError where the measure needs weights of 0 or more and the quadrature `rule` has others."""
+        if self.name not in _UNWEIGHTED and weights.min() < 0.0:
+            raise InputError(
+                f"quadrature{rule and f' {rule!r}'} has a weight of {weights.min():.4g}, but risk '{self.name}' needs "
+                "weights of 0 or more; choose 'quasi_monte_carlo', 'gauss_hermite', or 'unscented' with k >= 0."
+            )
+
     def measure(self, draws: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return rho (...) of draws (..., s)."""
+        """Return rho (...) of draws (..., s); raises InputError for negative weights where they have no meaning."""
+        self.check_weights(weights)
         if self.name == "worst":
             return draws.min(axis=-1)
         mean = draws @ weights
@@ -75,7 +85,7 @@ class RiskImprovement:
     posterior, perturbations, risk
         The surrogate, the input noise, what is asked of the outcome.
     best
-        Value to improve upon.
+        Value to improve upon; None for the expected measure itself.
     rng
         For the common random numbers of the draws.
     """
@@ -85,14 +95,14 @@ class RiskImprovement:
         posterior: Posterior,
         perturbations: Perturbations,
         risk: Risk,
-        best: float,
+        best: float | None,
         rng: np.random.Generator,
     ):
         self._posterior = posterior
         self._perturbations = perturbations
         self._risk = risk
         self._best = best
-        self._normals = rng.standard_normal((_DRAWS, len(perturbations.quadrature.weights)))
+        self._normals = rng.standard_normal((RISK_DRAWS, len(perturbations.quadrature.weights)))
 
     def values(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return draws of the risk measure (m b, q) at U (q, d)."""
@@ -107,6 +117,8 @@ class RiskImprovement:
     def __call__(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the expected improvement (q,); where no draw improves, how near the best one comes (negative)."""
         rho = self.values(U)
+        if self._best is None:
+            return rho.mean(axis=0)
         gain = np.maximum(rho - self._best, 0.0).mean(axis=0)
         return np.where(gain > 0.0, gain, np.minimum(rho.max(axis=0) - self._best, 0.0))
 

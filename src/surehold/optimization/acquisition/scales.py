@@ -1,10 +1,10 @@
-"""The quantity that is maximized to choose the next trial: a criterion, averaged over particles and input noise.
+"""The acquisition function: a criterion, averaged over particles and input noise.
 
-Three scales, for a criterion c and the sigma points xi_i, w_i of the input noise:
+Three scales, for a criterion c and the points xi_i, with weights w_i, of a quadrature of the input noise:
     exact       mean_j c(f_j(x))                     the input is reached exactly
     unscented   sum_i w_i mean_j c(f_j(x + xi_i))    the criterion is averaged, thesis (3.20)
     robust      mean_j c(g_j(x))                     the outcome is averaged: g = sum_i w_i f(x + xi_i)
-where f_j is the posterior under particle j and c stands for its value at a mean and a standard deviation.
+where f_j is the posterior under particle j and c its value at a mean and a standard deviation.
 """
 
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import KAPPA
 from surehold.errors import unknown_name
 from surehold.optimization.acquisition.criteria import (
     Value,
@@ -21,24 +22,15 @@ from surehold.optimization.acquisition.criteria import (
     probability_of_improvement,
     upper_confidence_bound,
 )
-from surehold.optimization.maximizer.ascent import by_differences
 from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.numerics.differences import by_differences
 from surehold.optimization.surrogates.protocol import Moments, Posterior
 
-__all__ = ["CRITERIA", "Acquisition", "CriterionName", "criterion_name", "where_to_look"]
+__all__ = ["CRITERIA", "Acquisition", "CriterionName", "criterion_name"]
 
-_BASES: Final = ("ei", "log_ei", "pi", "ucb")
-CRITERIA: Final = (
-    *_BASES,
-    *(f"u{base}" for base in _BASES),
-    *(f"robust_{base}" for base in _BASES),
-    "thompson",
-    "robust_thompson",
-)
-
-# A trial at the very place may become the answer, one beside it seldom does; and in several dimensions there is always
-# some sigma point that tells a little more. With 1, needles in 3 and 5 dimensions take twice the trials.
-_AT_THE_PLACE: Final = 3.0
+_BASES: Final = ("ei", "log_ei", "pi", "ucb")  # those that have a formula
+_UNSCENTED: Final = {"uei": "ei", "ulog_ei": "log_ei"}
+CRITERIA: Final = (*_BASES, *_UNSCENTED, *(f"robust_{base}" for base in _BASES), "thompson", "robust_thompson")
 
 Scale = Literal["exact", "unscented", "robust"]
 
@@ -58,20 +50,20 @@ def criterion_name(name: str) -> CriterionName:
         raise unknown_name("criterion", name, CRITERIA)
     if name.startswith("robust_"):
         return CriterionName(name.removeprefix("robust_"), "robust")
-    if name in _BASES or name == "thompson":
-        return CriterionName(name, "exact")
-    return CriterionName(name[1:], "unscented")
+    if name in _UNSCENTED:
+        return CriterionName(_UNSCENTED[name], "unscented")
+    return CriterionName(name, "exact")
 
 
 class Acquisition:
-    """A criterion on a posterior; larger is better. "log_ei" gives the logarithm of the averaged improvement.
+    """A criterion on a posterior; larger is better. "log_ei" is the logarithm of the averaged improvement.
 
     Parameters
     ----------
     posterior
         The surrogate, conditioned on the trials.
     name
-        Criterion and scale.
+        Criterion and scale. Thompson sampling has no acquisition function.
     perturbations
         Quadrature of the input noise; a single zero offset where the scale is "exact".
     best
@@ -80,6 +72,11 @@ class Acquisition:
         Improvement that does not count, in the outputs' units.
     kappa
         Standard deviations added by "ucb".
+
+    Raises
+    ------
+    InputError
+        If the criterion has no acquisition function.
     """
 
     def __init__(
@@ -90,8 +87,10 @@ class Acquisition:
         best: float | NDArray[np.float64],
         *,
         margin: float = 0.0,
-        kappa: float = 2.0,
+        kappa: float = KAPPA,
     ):
+        if name.base not in _BASES:
+            raise unknown_name("acquisition function", name.base, _BASES)
         self._posterior = posterior
         self._name = name
         self._perturbations = perturbations
@@ -105,7 +104,7 @@ class Acquisition:
 
     def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the values (q,) and their gradients (q, d) at points U (q, d)."""
-        if self._perturbations.root is not None:  # of noise that varies, by a user's function without a derivative
+        if self._perturbations.root is not None:  # noise that varies, by a user's function without a derivative
             return by_differences(self, U)
         return self._evaluate(U, True)
 
@@ -167,34 +166,3 @@ def _log_of_sum(
     safe = np.where(positive, total, 1.0)
     value = np.where(positive, top + np.log(safe), -np.inf)
     return value, np.where(positive[:, None], terms / safe[:, None], 0.0)
-
-
-def where_to_look(
-    posterior: Posterior,
-    u: NDArray[np.float64],
-    perturbations: Perturbations,
-    steps: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return points (c, d) of the cube around u (d,), the one that tells most about g(u) first.
-
-    Trying u itself does not remove the uncertainty about its outcome under input noise. Among u, u + step and
-    u + step / 2 for the given steps (s, d), the trial z reduces the variance of g(u) by
-    cov(g(u), f(z))^2 / (var f(z) + noise). The covariance comes from var(g + f) = var g + var f + 2 cov(g, f).
-    What u itself tells counts threefold.
-    """
-    steps = steps[np.any(steps != 0.0, axis=1)]
-    points = np.clip(u + np.concatenate([0.0 * steps[:1], steps, 0.5 * steps]), 0.0, 1.0)
-    offsets = perturbations.around(u[None, :])[0] - u  # (s, d)
-    weights = np.append(perturbations.quadrature.weights, 1.0)
-    variance_g = posterior.average(u[None, :], offsets, weights[:-1]).variance  # (m, 1)
-    variance_f = posterior.moments(points).variance  # (m, c)
-    together = np.concatenate(
-        [np.tile(offsets, (len(points), 1, 1)), (points - u)[:, None, :]], axis=1
-    )  # (c, s + 1, d)
-    both = posterior.average(np.tile(u, (len(points), 1)), together, weights).variance
-    covariance = 0.5 * (both - variance_g - variance_f)  # (m, c)
-    total = variance_f + posterior.noise_variance(points)
-    share = np.divide(covariance, np.sqrt(total), out=np.zeros_like(total), where=total > 0.0)
-    gain = np.mean(share**2, axis=0)
-    gain[0] *= _AT_THE_PLACE
-    return points[np.argsort(-gain, kind="stable")]

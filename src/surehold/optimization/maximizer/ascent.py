@@ -13,20 +13,21 @@ BFGS (Nocedal and Wright 2006, formula 6.17) with backtracking; coordinates at a
 stay there, the others' steps are cut off at the borders (Bertsekas 1982).
 """
 
-from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Objective", "by_differences", "climb"]
+from surehold.defaults import (
+    ASCENT_EVALUATIONS,
+    ASCENT_FIRST_STEP,
+    ASCENT_LONGEST_STEP,
+    ASCENT_PRECISION,
+    ASCENT_SHORTEN,
+    ASCENT_SUFFICIENT,
+)
 
-_FIRST_STEP: Final = 0.05  # length of the first step and the longest one later, in box widths
-_LONGEST_STEP: Final = 0.25
-_SUFFICIENT: Final = 1e-4  # share of the gain promised by the slope that a step must bring
-_SHORTEN: Final = 0.25
-_DIFFERENCE: Final = 1e-4  # step of finite differences, in box widths
-_PRECISION: Final = 1e-8  # an ascent ends when a step gains less than this, or is shorter
+__all__ = ["Objective", "climb"]
 
 
 class Objective(Protocol):
@@ -46,7 +47,7 @@ def climb(
     starts: NDArray[np.float64],
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
-    evaluations: int = 40,
+    evaluations: int = ASCENT_EVALUATIONS,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the points (a, d) reached from starts (a, d) inside boxes [lower, upper] (a, d), and their values (a,).
 
@@ -60,7 +61,7 @@ def climb(
     U, F, G = points[alive], values[alive], gradients[alive]
     low, high = lower[alive], upper[alive]
     d = U.shape[1]
-    B = _scaled_identity(_FIRST_STEP / np.maximum(np.abs(G).max(axis=1), 1e-300), d)
+    B = _scaled_identity(ASCENT_FIRST_STEP / np.maximum(np.abs(G).max(axis=1), 1e-300), d)
     fresh = np.ones(len(U), dtype=bool)
     t = np.ones(len(U))
     for _ in range(evaluations - 1):
@@ -70,38 +71,26 @@ def climb(
         free = np.where(held, 0.0, G)
         direction = np.where(held, 0.0, np.einsum("rij,rj->ri", B, free))
         length = np.abs(direction).max(axis=1)
-        direction *= np.minimum(1.0, _LONGEST_STEP / np.maximum(length, 1e-300))[:, None]
+        direction *= np.minimum(1.0, ASCENT_LONGEST_STEP / np.maximum(length, 1e-300))[:, None]
         V = np.clip(U + t[:, None] * direction, low, high)
         S = V - U
         value, gradient = objective.with_gradient(V)
         promised = np.einsum("ri,ri->r", G, S)
         with np.errstate(invalid="ignore"):  # a value may be infinite
-            better = (value >= F + _SUFFICIENT * promised) & np.isfinite(gradient).all(axis=1)
+            better = (value >= F + ASCENT_SUFFICIENT * promised) & np.isfinite(gradient).all(axis=1)
         gain = np.where(better, value, F) - F
         moved = np.abs(S).max(axis=1)
         Y = G - np.where(better[:, None], gradient, G)
         B, fresh = _updated(B, S, Y, better, fresh)
         U, G = np.where(better[:, None], V, U), np.where(better[:, None], gradient, G)
         F = F + gain
-        t = np.where(better, 1.0, _SHORTEN * t)
+        t = np.where(better, 1.0, ASCENT_SHORTEN * t)
         points[alive], values[alive] = U, F
-        going = (moved > _PRECISION) & ~(better & (gain <= _PRECISION * (1.0 + np.abs(F))))
+        going = (moved > ASCENT_PRECISION) & ~(better & (gain <= ASCENT_PRECISION * (1.0 + np.abs(F))))
         if not going.all():
             alive, U, F, G, B = alive[going], U[going], F[going], G[going], B[going]
             t, fresh, low, high = t[going], fresh[going], low[going], high[going]
     return points, values
-
-
-def by_differences(
-    objective: Callable[[NDArray[np.float64]], NDArray[np.float64]], U: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return values (q,) and gradients (q, d) of an objective at U (q, d), by central differences."""
-    q, d = U.shape
-    steps = _DIFFERENCE * np.eye(d)
-    around = (U[:, None, :] + np.concatenate([steps, -steps])).reshape(-1, d)
-    values = objective(np.concatenate([U, around]))
-    sides = values[q:].reshape(q, 2, d)
-    return values[:q], (sides[:, 0] - sides[:, 1]) / (2.0 * _DIFFERENCE)
 
 
 def _scaled_identity(scales: NDArray[np.float64], d: int) -> NDArray[np.float64]:
@@ -116,6 +105,9 @@ def _updated(
     fresh: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return B after steps S (r, d) that changed the gradient by -Y (r, d), and which are still without an update."""
+    # c S and c Y give the same B. A power of two as c rounds nothing, and keeps 1 / s'y finite at steps of 1e-155.
+    exponent = (np.frexp(np.abs(S).max(axis=1))[1] + np.frexp(np.abs(Y).max(axis=1))[1]) // 2
+    S, Y = np.ldexp(S, -exponent[:, None]), np.ldexp(Y, -exponent[:, None])
     sy = np.einsum("ri,ri->r", S, Y)
     yy = np.einsum("ri,ri->r", Y, Y)
     curved = accepted & (sy > 1e-12 * np.sqrt(yy) * np.abs(S).max(axis=1)) & (yy > 0.0) & np.isfinite(yy)

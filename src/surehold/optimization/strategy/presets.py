@@ -10,14 +10,12 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from surehold.errors import unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, Prior
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
-__all__ = ["THESIS", "TREED", "Thesis", "TreedSettings", "thesis_preset"]
+__all__ = ["TREED", "TreedSettings"]
 
 
 class TreedSettings(NamedTuple):
@@ -55,44 +53,3 @@ class TreedSettings(NamedTuple):
 
 
 TREED: Final = TreedSettings(min_leaf=15)
-
-
-class Thesis(NamedTuple):
-    """What the thesis sets by hand for a problem."""
-
-    signal_variance: float = 1.0
-    """[sigma_p], used as a variance"""
-    ratio: float = 1e-6
-    """[sigma_n], nugget as a fraction of the signal variance"""
-    margin: float = 0.0
-    """[xi], 0.01 / sigma_p as the original program divided it"""
-    min_leaf: int = 20
-    """[s_l], smallest number of samples in a leaf of the tree"""
-
-    def gaussian_process(self) -> GaussianProcess:
-        """Return the thesis' Gaussian process: zero mean, flat prior, 100 + 10 slice sweeps (spec of its section 3)."""
-        return GaussianProcess(
-            signal_variance=self.signal_variance,
-            ratio=self.ratio,
-            standardize=False,
-            prior=Prior(log_length_scale=(1.0, 10.0)),
-            learning=Learning("slice", particles=10, burn_in=100, thin=1, width=6.0),
-        )
-
-
-THESIS: Final = {
-    "thesis": Thesis(),
-    "thesis-rkhs": Thesis(3.93, 1e-6, 0.0025, 8),
-    "thesis-gf": Thesis(0.40, 1e-6, 0.025, 15),
-    "thesis-gm": Thesis(0.0642, 1e-6, 0.1558, 15),
-    "thesis-gm-printed": Thesis(0.642, 1e-6, 0.0156, 15),
-    "thesis-gm-noise": Thesis(0.642, 1e-6, 0.0, 15),
-    "thesis-grasp": Thesis(0.35, 1e-4, 0.0, 20),
-}
-
-
-def thesis_preset(name: str) -> Thesis:
-    """Return the constants of a preset; raises InputError for an unknown name."""
-    if name not in THESIS:
-        raise unknown_name("preset", name, THESIS)
-    return THESIS[name]

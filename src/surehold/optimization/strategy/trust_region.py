@@ -5,21 +5,33 @@ did not; here its side is worked out anew from the history of values, so that no
 become too small starts again at its first size, around the best trial so far.
 """
 
-from typing import Final
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import (
+    TRUST_FAILURES,
+    TRUST_FIRST,
+    TRUST_IMPROVEMENT,
+    TRUST_LARGEST,
+    TRUST_SMALLEST,
+    TRUST_SUCCESSES,
+)
 from surehold.optimization.surrogates.protocol import Regions
 
-__all__ = ["box_around", "side_after"]
+__all__ = ["TrustRegion", "box_around", "side_after"]
 
-_FIRST: Final = 0.8
-_LARGEST: Final = 1.6
-_SMALLEST: Final = 0.5**7
-_SUCCESSES: Final = 3  # in a row, after which the box grows
-_FAILURES: Final = 4  # in a row, or as many as there are variables if these are more, after which it shrinks
-_IMPROVEMENT: Final = 1e-3  # of the best value's size, below which a trial does not count as better
+
+@dataclass(frozen=True)
+class TrustRegion:
+    """The box in which the next trial is sought; `n_initial` trials belong to the initial design."""
+
+    n_initial: int
+
+    def within(self, regions: Regions, center: NDArray[np.float64], values: NDArray[np.float64]) -> Regions:
+        """Return the parts of regions inside the box around a center (d,), after trials with values (n,)."""
+        return regions.within(box_around(center, side_after(values, self.n_initial, len(center))))
 
 
 def side_after(values: NDArray[np.float64], n_initial: int, d: int) -> float:
@@ -27,21 +39,21 @@ def side_after(values: NDArray[np.float64], n_initial: int, d: int) -> float:
 
     The first `n_initial` trials count as the design.
     """
-    side, successes, failures = _FIRST, 0, 0
-    patience = max(_FAILURES, d)
+    side, successes, failures = TRUST_FIRST, 0, 0
+    patience = max(TRUST_FAILURES, d)
     best = -np.inf
     for i, value in enumerate(values):
-        better = value > best + (_IMPROVEMENT * abs(best) if np.isfinite(best) else 0.0)
+        better = value > best + (TRUST_IMPROVEMENT * abs(best) if np.isfinite(best) else 0.0)
         best = max(best, value)
         if i < n_initial:
             continue
         successes, failures = (successes + 1, 0) if better else (0, failures + 1)
-        if successes == _SUCCESSES:
-            side, successes = min(2.0 * side, _LARGEST), 0
+        if successes == TRUST_SUCCESSES:
+            side, successes = min(2.0 * side, TRUST_LARGEST), 0
         elif failures == patience:
             side, failures = 0.5 * side, 0
-            if side < _SMALLEST:
-                side = _FIRST
+            if side < TRUST_SMALLEST:
+                side = TRUST_FIRST
     return side
 
 

@@ -5,7 +5,8 @@ from typing import Final
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.strategy.presets import TREED, Thesis, TreedSettings
+from surehold.optimization.strategy.presets import TREED, TreedSettings
+from surehold.optimization.strategy.thesis import ThesisConstants
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, NoiseName
 from surehold.optimization.surrogates.local_global import LocalGlobalProcess
 from surehold.optimization.surrogates.protocol import Surrogate
@@ -22,7 +23,7 @@ def surrogate_named(
     seed: int,
     noise: float | NoiseName,
     output_range: tuple[float, float] | None,
-    thesis: Thesis | None,
+    thesis: ThesisConstants | None,
 ) -> Surrogate:
     """Return the surrogate of that name; arguments as of `Optimizer`, `thesis` the constants of a preset.
 

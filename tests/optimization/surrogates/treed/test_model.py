@@ -9,7 +9,7 @@ from sklearn.gaussian_process.kernels import Matern
 import surehold as sh
 from surehold.errors import InputError
 from surehold.optimization.noise.quadratures import sigma_points
-from surehold.optimization.strategy.presets import thesis_preset
+from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, Prior
 from surehold.optimization.surrogates.gaussian_process.likelihood import (
     Evidence,

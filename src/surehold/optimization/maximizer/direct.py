@@ -18,9 +18,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import THESIS_EVALUATIONS, THESIS_LOCAL_SCALE, THESIS_LOCAL_TRIALS, THESIS_POLISH_SHARE
+from surehold.optimization.maximizer.ascent import Objective, climb
+from surehold.optimization.surrogates.protocol import Regions
 from surehold.store.kernels import njit
 
-__all__ = ["divide_rectangles"]
+__all__ = ["divide_and_climb", "divide_rectangles"]
 
 _DEEPEST: Final = 40  # levels of a side; 3^-40 is beyond double precision
 _TOLERANCE: Final = 1e-12  # a gain below this, or below this share of the value, ends a search
@@ -172,6 +175,30 @@ def divide_rectangles(
             budgets[(gain > 0.0) & (gain < negligible)] = 0
         best, first = raised, False
     return lower + width * centers[np.arange(regions), values.argmax(axis=1)]
+
+
+def divide_and_climb(
+    objective: Objective,
+    dimension: int,
+    incumbent: NDArray[np.float64],
+    rng: np.random.Generator,
+    regions: Regions | None = None,
+) -> NDArray[np.float64]:
+    """Return points (c, d) worth trying, best first, found as in the original program of the thesis.
+
+    DIRECT with 500 d evaluations in each of the regions (None: in the cube), a tenth of them for a local polish, then
+    local searches from five points around the incumbent (d,) over the whole cube. The local search climbs the gradient.
+    """
+    lower, upper = regions or Regions.whole(dimension)
+    budget = THESIS_EVALUATIONS * dimension
+    polish = budget // THESIS_POLISH_SHARE
+    found = divide_rectangles(objective, lower, upper, budget - polish)
+    around = incumbent + THESIS_LOCAL_SCALE * rng.standard_normal((THESIS_LOCAL_TRIALS, dimension))
+    starts = np.concatenate([found, np.clip(around, 0.0, 1.0)])
+    low = np.concatenate([lower, np.zeros_like(around)])
+    high = np.concatenate([upper, np.ones_like(around)])
+    tops, values = climb(objective, starts, low, high, polish)
+    return tops[np.argsort(-values, kind="stable")]
 
 
 def _finite(values: NDArray[np.float64]) -> NDArray[np.float64]:

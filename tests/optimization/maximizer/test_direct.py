@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from scipy.optimize import direct
 
-from surehold.optimization.maximizer.dividing_rectangles import divide_rectangles
+from surehold.optimization.maximizer.direct import divide_and_climb, divide_rectangles
 
 
 def rugged(U):
@@ -66,3 +66,29 @@ def test_level_functions_and_values_that_are_not_finite():
     for value in (0.0, -np.inf, np.nan):
         found = divide_rectangles(lambda U, v=value: np.full(len(U), v), np.zeros((1, 2)), np.ones((1, 2)), 300)
         assert np.all((found >= 0.0) & (found <= 1.0))
+
+
+class TwoPeaks:
+    """A broad hill at 0.25 of height 1 and a narrower one at 0.8 of height 2, the same in every variable."""
+
+    def __call__(self, U):
+        return sum(self._parts(U))
+
+    def with_gradient(self, U):
+        low, high = (part[:, None] for part in self._parts(U))
+        return self(U), -low * (U - 0.25) / 0.2**2 - high * (U - 0.8) / 0.15**2
+
+    @staticmethod
+    def _parts(U):
+        low = np.exp(-0.5 * np.sum((U - 0.25) ** 2, axis=1) / 0.2**2)
+        return low, 2.0 * np.exp(-0.5 * np.sum((U - 0.8) ** 2, axis=1) / 0.15**2)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_the_search_of_the_thesis_finds_the_higher_of_two_peaks(d):
+    found = divide_and_climb(TwoPeaks(), d, np.full(d, 0.25), np.random.default_rng(0))
+    np.testing.assert_allclose(found[0], 0.8, atol=1e-2)
+    values = TwoPeaks()(found)
+    assert np.all(np.diff(values) <= 0.0), "the best point does not come first"
+    again = divide_and_climb(TwoPeaks(), d, np.full(d, 0.25), np.random.default_rng(0))
+    assert np.array_equal(found, again)

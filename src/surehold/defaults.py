@@ -1,0 +1,143 @@
+"""Every constant that decides which trial an optimizer asks for next: value, unit, reason, and what chose it.
+
+Behind each value stands the command that measured it, or the honest words "never measured". Where a command measures
+the whole rather than this value against others, it says so. Tolerances that only guard against overflow and rounding
+stay in the module that needs them.
+
+"Box widths" are widths of the unit cube, in which the optimizer works; "particles" are the equally likely settings of
+the surrogate's hyperparameters.
+"""
+
+from typing import Final
+
+# --- initial design ---------------------------------------------------------------------------------------------------
+
+#: Trials of the initial design for each variable, and their least number. Never measured.
+DESIGN_PER_VARIABLE: Final = 5
+DESIGN_LEAST: Final = 6
+
+# --- which tried inputs are the best ones -----------------------------------------------------------------------------
+
+#: Best tried inputs around which the maximizer lays candidates. One may sit on a hill that is not the highest.
+#: Never measured.
+ANCHORS: Final = 3
+#: Inputs, the best by the coarse ranking, that are ranked again with all particles and the accurate quadrature. The
+#: coarse ranking need only place the best input among the first 16. Never measured on its own; what a quadrature's
+#: ranking loses: python -m benchmarks.quadrature_error.
+SHORTLIST: Final = 16
+#: The coarse ranking, and the choice of the ascents' starts, use every (m // 3)-th of the m particles: numbers 0, 3, 6
+#: and 9 of the default 10, which are four. It saves time: python -m benchmarks.suggestion_time. Its effect on the
+#: result was never measured.
+SCREENING_DIVISOR: Final = 3
+
+# --- which improvements are worth a trial -----------------------------------------------------------------------------
+
+#: Improvement that does not count where observations and inputs are exact, in mean absolute deviations of the outputs.
+#: Without it what is left of the model's variance beside the incumbent, the nugget's, draws trial after trial to the
+#: same hill. Never measured on its own; the whole: python -m benchmarks.best_observed.
+MARGIN: Final = 1e-3
+#: The same for an outcome averaged over input noise, of which more variance is left: with 0.001 the broad hill of GM
+#: holds 4 of 30 runs under a noise of 0.02, with 0.01 none.
+#: python -m benchmarks.robust_regret --problems "gm 0.02" "gm 0.01" --methods default --seeds 30
+MARGIN_UNDER_NOISE: Final = 1e-2
+#: Every third trial counts any improvement, so that a smooth top is still found to many digits. It is due on the same
+#: trials as COVERING_PERIOD: while the search is stalled those trials cover, and none polishes. Never measured.
+POLISH_PERIOD: Final = 3
+
+# --- insurance against a model that is too smooth ---------------------------------------------------------------------
+
+#: Trials without a new best one after which the search counts as stalled. Never measured.
+COVERING_PATIENCE: Final = 3
+#: While it is stalled, every third trial goes to the largest hole; see POLISH_PERIOD. Never measured.
+COVERING_PERIOD: Final = 3
+#: Points of a Sobol sequence among which the center of the largest hole is sought. Never measured.
+HOLE_CANDIDATES: Final = 1024
+#: A hole may reach beyond the cube by this share of its radius; without a limit the corners, which are farthest from
+#: everything and seldom where the answer is, would be filled first. Never measured.
+HOLE_BEYOND: Final = 0.5
+
+# --- acquisition functions --------------------------------------------------------------------------------------------
+
+#: Standard deviations that the upper confidence bounds add, where `Optimizer(kappa=)` says nothing. Customary.
+#: Never measured.
+KAPPA: Final = 2.0
+#: How much more the variance reduction counts that a trial at the candidate itself brings than one beside it: it may
+#: become the answer, and in several dimensions some sigma point always tells a little more. With 1, needles in 3 and 5
+#: dimensions take twice the trials.
+#: python -m benchmarks.robust_regret --problems needle-3 needle-5 --methods default "no where to look"
+AT_THE_PLACE: Final = 3.0
+#: Share of a sigma point's offset at which a trial beside the candidate is considered, besides the whole offset. Never
+#: measured.
+LOOK_BETWEEN: Final = 0.5
+#: Joint draws of each particle in the improvement of a risk measure. Common random numbers make it smooth in the query.
+#: Never measured; the measures as a whole: surehold campaign run risk-measures.
+RISK_DRAWS: Final = 16
+#: Standard deviations of the upper confidence bound by which Thompson sampling chooses the points of its joint draw.
+#: A draw's maximum elsewhere is improbable. Never measured.
+PLAUSIBLE: Final = 3.0
+#: Points of that joint draw, perturbed ones included: its cost grows with their cube. Never measured.
+JOINT_POINTS: Final = 512
+
+# --- quadratures of the input noise -----------------------------------------------------------------------------------
+
+#: Quasi-random points, as a power of two, by which outcomes are averaged. python -m benchmarks.quadrature_error
+QUASI_RANDOM_EXPONENT: Final = 5
+#: The same for the description of the recommended input: quantiles need more points than means. Never measured.
+OUTCOME_EXPONENT: Final = 7
+
+# --- the maximizer of the acquisition function ------------------------------------------------------------------------
+
+#: Candidates from a Sobol sequence over the cube. Never measured on its own; the whole: python -m
+#: benchmarks.suggestion_time (time), python -m benchmarks.best_observed (result).
+CANDIDATES: Final = 256
+#: Standard deviations of the perturbed copies of each anchor, in box widths, and copies of each: a narrow peak is found
+#: from its flank, hardly by chance. Never measured on their own.
+COPY_SCALES: Final = (0.1, 0.03, 0.01, 0.003)
+COPIES: Final = 8
+#: Gradient ascents from the best candidates, and the least distance between two of their starts, in box widths.
+#: Never measured on their own.
+STARTS: Final = 4
+START_DISTANCE: Final = 0.02
+#: Candidates shared out among the regions of a tree, and regions of which each sends its best candidate to an ascent,
+#: besides the best ones wherever they are. Never measured on their own.
+CANDIDATES_IN_REGIONS: Final = 512
+STARTS_IN_REGIONS: Final = 6
+#: Evaluations, with gradient, of one ascent. Never measured on its own.
+ASCENT_EVALUATIONS: Final = 40
+#: Length of an ascent's first step and of its longest one later, in box widths. Never measured.
+ASCENT_FIRST_STEP: Final = 0.05
+ASCENT_LONGEST_STEP: Final = 0.25
+#: Share of the gain promised by the slope that a step must bring, and the factor that shortens one that does not: the
+#: sufficient decrease of Nocedal and Wright 2006, section 3.1. Never measured.
+ASCENT_SUFFICIENT: Final = 1e-4
+ASCENT_SHORTEN: Final = 0.25
+#: An ascent ends when a step is shorter, in box widths, or gains less than this share of 1 + |value|. Never measured.
+ASCENT_PRECISION: Final = 1e-8
+#: Step of central differences, in box widths: near the fourth root of the rounding error, for values that come from a
+#: factorization are good to about 1e-12. Never measured.
+DIFFERENCE_STEP: Final = 1e-4
+
+# --- the trust region, an option --------------------------------------------------------------------------------------
+
+#: First, largest and smallest side of the box, in box widths; successes and failures in a row after which it doubles or
+#: halves; and the share of |best value| by which a trial must exceed it to count as a success: the values of Eriksson
+#: et al. 2019 (TuRBO-1), for one trial at a time. Never measured here.
+TRUST_FIRST: Final = 0.8
+TRUST_LARGEST: Final = 1.6
+TRUST_SMALLEST: Final = 0.5**7
+TRUST_SUCCESSES: Final = 3
+TRUST_FAILURES: Final = 4
+TRUST_IMPROVEMENT: Final = 1e-3
+
+# --- the thesis presets -----------------------------------------------------------------------------------------------
+
+#: Evaluations of DIRECT for each variable, and the share of them left to a polish along the gradient: the original
+#: program's, of its section on the maximization of the criterion.
+THESIS_EVALUATIONS: Final = 500
+THESIS_POLISH_SHARE: Final = 10
+#: Starts around the incumbent, and their standard deviation in box widths: the original program's.
+THESIS_LOCAL_TRIALS: Final = 5
+THESIS_LOCAL_SCALE: Final = 0.05
+#: How often a trial may be repeated where observations are exact. The original repeats a point twenty times before it
+#: jumps to a random one, which cost it whole runs. Never measured against other numbers.
+THESIS_REPEATS: Final = 2

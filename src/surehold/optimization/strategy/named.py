@@ -1,0 +1,77 @@
+"""The strategy that follows from an optimizer's settings."""
+
+import numpy as np
+
+from surehold.errors import InputError
+from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.acquisition.scales import criterion_name
+from surehold.optimization.box import Box
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.strategy.covering import Covering
+from surehold.optimization.strategy.expected_improvement import ExpectedImprovement
+from surehold.optimization.strategy.protocol import Strategy
+from surehold.optimization.strategy.ranking import Ranking
+from surehold.optimization.strategy.risk import RiskAverse
+from surehold.optimization.strategy.thesis import ThesisConstants, ThesisImprovement
+from surehold.optimization.strategy.thompson import Thompson
+from surehold.optimization.strategy.trust_region import TrustRegion
+
+__all__ = ["strategy_named"]
+
+
+def strategy_named(
+    criterion: str | None,
+    risk: Risk,
+    box: Box,
+    input_noise: InputNoise | None,
+    *,
+    quadrature: str | None,
+    k: float,
+    border: str,
+    kappa: float,
+    noisy: bool,
+    trust_region: TrustRegion | None,
+    thesis: ThesisConstants | None,
+) -> Strategy:
+    """Return the strategy of these settings, as of `Optimizer`; `noisy`: whether observations carry noise.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a value out of range, or settings that contradict each other.
+    """
+    if criterion is None:
+        criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + (input_noise is not None)]
+    name = criterion_name(criterion)
+    if not np.isfinite(kappa):
+        raise InputError(f"kappa is {kappa!r}; give a finite number of standard deviations.")
+    averse = risk.name != "mean"
+    if input_noise is None and (name.scale != "exact" or averse):
+        what = f"risk '{risk.name}'" if averse else f"criterion '{criterion}'"
+        raise InputError(f"{what} needs input noise; give input_noise=.")
+    rule = quadrature or ("quasi_monte_carlo" if name.scale == "robust" or averse else "unscented")
+    accurate = Perturbations.of(input_noise, box, rule, border, k=k)
+    risk.check_weights(accurate.quadrature.weights, rule)
+    coarse = Perturbations.of(input_noise, box, "unscented", border)
+    ranking = Ranking(accurate, coarse, risk, noisy, screened=thesis is None)
+    if thesis is not None:
+        for setting, given in (
+            (f"risk='{risk.name}'", averse),
+            (f"criterion='{criterion}'", name.base == "thompson"),
+            ("trust_region=True", trust_region is not None),
+        ):
+            if given:
+                raise InputError(
+                    f"{setting} chooses trials in another way than the thesis does; leave it out, or the preset."
+                )
+        return ThesisImprovement(ranking, name, thesis.margin, float(kappa))
+    exactly = name.scale == "exact" and not averse
+    strategy: Strategy
+    if averse:
+        strategy = RiskAverse(ranking, float(kappa), trust_region)
+    elif name.base == "thompson":
+        strategy = Thompson(ranking, exactly)
+    else:
+        strategy = ExpectedImprovement(ranking, name, float(kappa), trust_region)
+    return strategy if trust_region is not None else Covering(strategy, exactly)

@@ -1,0 +1,145 @@
+"""Which inputs are the best ones under the input noise, and the value that a further trial has to exceed.
+
+Legend
+    U         points of the unit cube, (q, d)
+    accurate  quadrature by which outcomes under the input noise are computed
+    coarse    sigma points: cheap, good enough to choose the inputs that are ranked again
+    outcome   UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over perturbations i and particles j     thesis (3.21)
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.defaults import ANCHORS, SCREENING_DIVISOR, SHORTLIST
+from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
+from surehold.optimization.acquisition.scales import Acquisition, CriterionName, Scale
+from surehold.optimization.maximizer.multistart import multistart
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.noise.quadratures import exact
+from surehold.optimization.surrogates.protocol import Posterior, mixture
+
+__all__ = ["History", "Ranking"]
+
+
+class History(NamedTuple):
+    """The trials by which the next one is chosen; inputs in the unit cube."""
+
+    tried: NDArray[np.float64]
+    """inputs that gave a value, (n, d)"""
+    observed: NDArray[np.float64]
+    """their values, (n,)"""
+    failed: NDArray[np.float64]
+    """inputs that gave no value, (f, d)"""
+    pending: NDArray[np.float64]
+    """inputs of trials under way, (p, d)"""
+
+    @property
+    def told(self) -> int:
+        """Number of trials that are finished, failed ones included."""
+        return len(self.tried) + len(self.failed)
+
+    @property
+    def spread(self) -> float:
+        """Mean absolute deviation of the values."""
+        return float(np.abs(self.observed - self.observed.mean()).mean())
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Orders inputs by their outcome under the input noise."""
+
+    accurate: Perturbations
+    coarse: Perturbations
+    risk: Risk
+    noisy: bool
+    """whether observations carry noise, so that the highest one is no incumbent"""
+    screened: bool = True
+    """whether the coarse perturbations and a part of the particles choose which inputs are ranked accurately"""
+
+    def order(
+        self, posterior: Posterior, U: NDArray[np.float64], observed: NDArray[np.float64] | None = None
+    ) -> NDArray[np.intp]:
+        """Return the indices of U, the input with the best outcome first.
+
+        Observed values (q,) decide where both inputs and observations are exact.
+        """
+        if observed is not None and not self.noisy and self.exact_inputs:
+            return np.argsort(-observed, kind="stable")
+        if self.screened:
+            first = _outcomes(posterior.thinned(SCREENING_DIVISOR), self.coarse, U)
+        else:
+            first = _outcomes(posterior, self.accurate, U)
+        order = np.argsort(-first, kind="stable")
+        top = order[:SHORTLIST]
+        if self.risk.name == "mean":
+            values = _outcomes(posterior, self.accurate, U[top])
+        else:
+            values = self.risk_at(posterior, U[top])
+        order[:SHORTLIST] = top[np.argsort(-values, kind="stable")]
+        return order
+
+    def best(self, posterior: Posterior, tried: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return the point of the cube (d,) with the best modelled outcome; `tried` (n, d) guide the search."""
+        anchors = tried[self.order(posterior, tried)[:ANCHORS]]
+        if self.risk.name == "mean":
+            mean = CriterionName("ucb", "robust")
+            objective, screen = (
+                Acquisition(posterior, mean, perturbations, 0.0, kappa=0.0)
+                for perturbations in (self.accurate, self.coarse)
+            )
+        else:
+            objective = screen = self._measured(posterior)
+        found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions)
+        candidates = np.concatenate([anchors[:1], found[:ANCHORS]])
+        return candidates[self.order(posterior, candidates)[0]]
+
+    def trials(self, posterior: Posterior, history: History, exactly: bool) -> NDArray[np.intp]:
+        """Return the indices of the tried inputs, best first; `exactly`: as if there were no input noise."""
+        if exactly:
+            return np.argsort(-self._values(posterior, history), kind="stable")
+        return self.order(posterior, history.tried)
+
+    def incumbent(self, posterior: Posterior, history: History, scale: Scale) -> tuple[Any, NDArray[np.float64]]:
+        """Return the value to improve upon, a number or (m, 1) for one a particle, and the best tried inputs (a, d)."""
+        if scale == "exact":
+            values = self._values(posterior, history)
+            return float(values.max()), history.tried[np.argsort(-values, kind="stable")[:ANCHORS]]
+        anchors = history.tried[self.order(posterior, history.tried)[:ANCHORS]]
+        if self.risk.name != "mean":
+            return float(self.risk_at(posterior, anchors[:1])[0]), anchors
+        best = self.accurate.outcome(posterior, anchors[:1]).mean  # (m, 1)
+        return best if scale == "robust" else float(best.mean()), anchors
+
+    def believed(self, posterior: Posterior, pending: NDArray[np.float64], scale: Scale) -> Any:
+        """Return the best value that trials under way (p, d) are believed to give, as `incumbent` does.
+
+        Without it a second trial would be sent to the top on which the first one is on its way.
+        """
+        if self.risk.name != "mean":
+            return self.risk_at(posterior, pending).max()
+        perturbations = Perturbations(exact(pending.shape[1])) if scale == "exact" else self.accurate
+        mean = perturbations.outcome(posterior, pending).mean  # (m, p)
+        return mean.mean(axis=0).max() if scale == "unscented" else mean.max(axis=1, keepdims=True)
+
+    def risk_at(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the expected risk measure (q,) at U (q, d)."""
+        return self._measured(posterior).expectation(U)
+
+    @property
+    def exact_inputs(self) -> bool:
+        """Whether inputs are reached exactly."""
+        return len(self.accurate.quadrature.weights) == 1
+
+    def _measured(self, posterior: Posterior) -> RiskImprovement:
+        # The same draws at every call: the ranking must not depend on how often it was asked for.
+        return RiskImprovement(posterior, self.accurate, self.risk, None, np.random.default_rng(0))
+
+    def _values(self, posterior: Posterior, history: History) -> NDArray[np.float64]:
+        return mixture(posterior.moments(history.tried))[0] if self.noisy else history.observed
+
+
+def _outcomes(posterior: Posterior, perturbations: Perturbations, U: NDArray[np.float64]) -> NDArray[np.float64]:
+    return perturbations.outcome(posterior, U).mean.mean(axis=0)

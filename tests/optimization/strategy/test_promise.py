@@ -1,0 +1,56 @@
+"""The promise against closed forms and draws on a fine grid."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.noise.quadratures import exact, quasi_monte_carlo, sigma_points
+from surehold.optimization.strategy.promise import promise
+from surehold.optimization.strategy.ranking import History, Ranking
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+
+GRID = np.linspace(0.0, 1.0, 1001)[:, None]
+NONE = np.empty((0, 1))
+TRIED = np.array([[0.0], [0.12], [0.3], [0.55], [0.8], [0.9], [1.0]])
+VALUES = np.sin(9.0 * TRIED[:, 0])
+HISTORY = History(TRIED, VALUES, NONE, NONE)
+S = np.array([[0.03**2]])
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    return GaussianProcess().fit(TRIED, VALUES).posterior
+
+
+def improvement(mean, std, best):
+    z = (mean - best) / np.maximum(std, 1e-12)
+    return ((mean - best) * norm.cdf(z) + std * norm.pdf(z)).mean(axis=0)
+
+
+def test_without_input_noise(posterior):
+    points = Perturbations(exact(1))
+    moments = posterior.moments(GRID)
+    expected = improvement(moments.mean, np.sqrt(moments.variance), VALUES.max()).max()
+    found = promise(Ranking(points, points, Risk(), False), posterior, HISTORY, np.random.default_rng(0))
+    assert found == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("risk", ["mean", "worst"])
+def test_of_the_outcome_under_input_noise(risk, posterior):
+    rule = quasi_monte_carlo(S)
+    ranking = Ranking(Perturbations(rule), Perturbations(sigma_points(S)), Risk(risk), False)
+    outcome, tried = (posterior.average(points, *rule) for points in (GRID, TRIED))
+    best = tried.mean[:, [int(np.argmax(tried.mean.mean(axis=0)))]]
+    expected = improvement(outcome.mean, np.sqrt(outcome.variance), best).max()
+    assert promise(ranking, posterior, HISTORY, np.random.default_rng(0)) == pytest.approx(expected, rel=1e-2)
+
+
+def test_of_a_risk_measure(posterior):
+    accurate, risk = Perturbations(quasi_monte_carlo(S)), Risk("cvar")
+    ranking = Ranking(accurate, Perturbations(sigma_points(S)), risk, False)
+    best, _ = ranking.incumbent(posterior, HISTORY, "robust")
+    expected = RiskImprovement(posterior, accurate, risk, best, np.random.default_rng(0))(GRID).max()
+    found = promise(ranking, posterior, HISTORY, np.random.default_rng(0))
+    assert 0.999 * expected <= found < 1.1 * expected, "between two points of the grid there is little more"

@@ -1,0 +1,108 @@
+"""Ranking against the model's outcomes at every point of a fine grid."""
+
+import numpy as np
+import pytest
+
+from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.noise.quadratures import exact, quasi_monte_carlo, sigma_points
+from surehold.optimization.strategy.ranking import History, Ranking
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+
+S = np.array([[0.05**2]])
+GRID = np.linspace(0.0, 1.0, 1001)[:, None]
+NONE = np.empty((0, 1))
+
+
+def f(X):
+    """A steep hill at 0.25 and a broad, lower one at 0.7."""
+    x = X[:, 0]
+    return np.exp(-0.5 * ((x - 0.25) / 0.05) ** 2) + 0.65 * np.exp(-0.5 * ((x - 0.7) / 0.2) ** 2)
+
+
+TRIED = np.random.default_rng(0).permutation(np.linspace(0.02, 0.98, 25))[:, None]
+HISTORY = History(TRIED, f(TRIED), NONE, NONE)
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    return GaussianProcess().fit(TRIED, f(TRIED)).posterior
+
+
+def ranking_of(risk="mean", noisy=False, screened=True):
+    accurate, coarse = Perturbations(quasi_monte_carlo(S)), Perturbations(sigma_points(S))
+    return Ranking(accurate, coarse, Risk(risk), noisy, screened)
+
+
+def outcome(posterior, U, risk="mean"):
+    """The measure of the model's mean at 256 perturbed points of each input."""
+    offsets = quasi_monte_carlo(S, 8).offsets
+    means = posterior.moments((U[:, None, :] + offsets).reshape(-1, 1)).mean.mean(axis=0).reshape(len(U), -1)
+    return Risk(risk).measure(means, np.full(len(offsets), 1.0 / len(offsets)))
+
+
+@pytest.mark.parametrize("screened", [True, False])
+@pytest.mark.parametrize("risk", ["mean", "cvar", "worst"])
+def test_the_best_tried_input_comes_first(risk, screened, posterior):
+    order = ranking_of(risk, screened=screened).order(posterior, TRIED)
+    assert sorted(order) == list(range(len(TRIED)))
+    assert order[0] == np.argmax(outcome(posterior, TRIED, risk))
+
+
+def test_observed_values_decide_where_nothing_is_uncertain(posterior):
+    points = Perturbations(exact(1))
+    values = np.random.default_rng(1).random(len(TRIED))  # other values than the model's
+    certain, noisy = (Ranking(points, points, Risk(), noisy) for noisy in (False, True))
+    np.testing.assert_array_equal(certain.order(posterior, TRIED, values), np.argsort(-values))
+    assert noisy.order(posterior, TRIED, values)[0] == np.argmax(f(TRIED))
+    assert ranking_of().order(posterior, TRIED, values)[0] != np.argmax(values)
+
+
+@pytest.mark.parametrize("risk", ["mean", "mean-std", "cvar", "worst"])
+def test_the_best_input_of_the_box(risk, posterior):
+    """With a risk measure the best tried input came back: everything counted as an infinite improvement."""
+    best = ranking_of(risk).best(posterior, TRIED, np.random.default_rng(0))
+    values = outcome(posterior, GRID, risk)
+    found = outcome(posterior, best[None, :], risk)[0]
+    assert found > values.max() - 0.02 * np.ptp(values)
+    assert not np.any(np.all(best == TRIED, axis=1))
+
+
+def test_incumbents(posterior):
+    ranking = ranking_of()
+    value, anchors = ranking.incumbent(posterior, HISTORY, "exact")
+    assert value == f(TRIED).max()
+    np.testing.assert_array_equal(anchors, TRIED[np.argsort(-f(TRIED))[:3]])
+    robust, anchors = ranking.incumbent(posterior, HISTORY, "robust")
+    best = TRIED[np.argmax(outcome(posterior, TRIED))]
+    np.testing.assert_array_equal(anchors[0], best)
+    np.testing.assert_allclose(robust.mean(), outcome(posterior, best[None, :])[0], atol=0.02)
+    assert robust.shape == (10, 1), "each particle improves upon its own value"
+    assert ranking.incumbent(posterior, HISTORY, "unscented")[0] == pytest.approx(robust.mean())
+    noisy = History(TRIED, f(TRIED) + np.eye(25)[int(np.argmin(f(TRIED)))] * 5.0, NONE, NONE)
+    modelled, _ = ranking_of(noisy=True).incumbent(posterior, noisy, "exact")
+    assert modelled == pytest.approx(f(TRIED).max(), abs=0.01), "one high value is no incumbent where values are noisy"
+
+
+@pytest.mark.parametrize("exactly", [True, False])
+def test_trials_in_their_order(exactly, posterior):
+    first = ranking_of().trials(posterior, HISTORY, exactly)[0]
+    assert first == np.argmax(f(TRIED) if exactly else outcome(posterior, TRIED))
+
+
+def test_trials_under_way_are_believed_to_give_the_models_mean(posterior):
+    pending = np.array([[0.26], [0.9]])
+    mean = posterior.moments(pending).mean  # (m, p)
+    ranking = ranking_of()
+    np.testing.assert_allclose(ranking.believed(posterior, pending, "exact")[:, 0], mean.max(axis=1))
+    averaged = outcome(posterior, pending).max()
+    assert ranking.believed(posterior, pending, "unscented") == pytest.approx(averaged, abs=0.02)
+    assert ranking.believed(posterior, pending, "robust").mean() == pytest.approx(averaged, abs=0.02)
+    lowest = outcome(posterior, pending, "worst").max()
+    assert ranking_of("worst").believed(posterior, pending, "robust") == pytest.approx(lowest, abs=0.1)
+
+
+def test_history():
+    history = History(TRIED, f(TRIED), np.zeros((3, 1)), np.zeros((2, 1)))
+    assert history.told == 28
+    assert history.spread == pytest.approx(np.mean(np.abs(f(TRIED) - np.mean(f(TRIED)))))
