@@ -141,7 +141,13 @@ def test_trials_that_raise_are_failures_and_the_run_goes_on(here, capsys):
 
 
 def test_all_trials_failed(capsys):
-    assert surehold("maximize own.py:hopeless --bounds a=0:1 --trials 6") == 1
+    line = "maximize own.py:hopeless --bounds a=0:1 --trials 6"
+    assert surehold(line) != 0
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "first 3 trials failed" in error
+    assert "give --tolerate-failures" in error
+    assert surehold(f"{line} --tolerate-failures") == 1
     error = capsys.readouterr().err
     assert "all 6 trials failed" in error
     assert "no robot here" in error

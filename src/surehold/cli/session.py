@@ -84,6 +84,7 @@ def run_session(
     units: Mapping[str, str] | None = None,
     quality_name: str = "value",
     disturbance: str = "the input is off",
+    tolerate_failures: bool = False,
     success_above: float | None = None,
     outcomes: Callable[[Result], Mapping[str, int]] = lambda result: {},
     advice: str = "",
@@ -133,7 +134,12 @@ def run_session(
         with announced(console):
             warm_up(problem, options)
         if kept is None or not kept.study:
-            result = _with_progress(problem, trials, options, console)
+            try:
+                result = _with_progress(problem, trials, options, tolerate_failures, console)
+            except SureholdError as error:  # which names the option as Python spells it
+                raise type(error)(
+                    str(error).replace("say tolerate_failures=True", "give --tolerate-failures")
+                ) from None
         else:
             result = _as_study(kept, problem, trials, options, units or {}, console)
         if result.interrupted:
@@ -190,14 +196,16 @@ def _new_folder_removed_on_error(folder: Path) -> Iterator[None]:
         raise
 
 
-def _with_progress(problem: Problem, trials: int, options: dict[str, Any], console: Console) -> Result:
+def _with_progress(
+    problem: Problem, trials: int, options: dict[str, Any], tolerate_failures: bool, console: Console
+) -> Result:
     with _progress(trials, options, console) as show:
 
         def told(trial: Trial) -> None:
             robust = None if trial.recommendation is None else trial.recommendation.mean
             show(trial.index + 1, trial.best, robust)
 
-        return maximize(problem, problem.box, trials, callback=told, **options)
+        return maximize(problem, problem.box, trials, callback=told, tolerate_failures=tolerate_failures, **options)
 
 
 def _as_study(
