@@ -364,3 +364,11 @@ def test_texts_that_a_spreadsheet_would_compute(here, capsys):
     assert run(["study", "export", "again", "--json"]) == 0
     trials = json.loads(capsys.readouterr().out)["trials"]
     assert [t["grip"] for t in trials[:2]] == ["=SUM(A1)", "-2"]
+
+
+def test_choices_need_no_quotes(capsys):
+    """A "|" is a pipe in a shell."""
+    assert run(["study", "create", "rig", "--parameters", "x=0:1,grip=pinch/power", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["parameters"]["grip"]["attributes"]["choices"] == ["pinch", "power"]
+    assert run(["study", "create", "old", "--parameters", "grip=a/b|c", "--noise", "none", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["parameters"]["grip"]["attributes"]["choices"] == ["a/b", "c"]

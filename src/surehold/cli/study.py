@@ -42,7 +42,7 @@ def create(
     parameters: Annotated[
         str,
         typer.Option(
-            help="dx=-0.05:0.05,force=0.1:100:log,fingers=2:5:int,turn=0:1:step=0.25,grip=pinch|power",
+            help="dx=-0.05:0.05,force=0.1:100:log,fingers=2:5:int,turn=0:1:step=0.25,grip=pinch/power",
             show_default=False,
         ),
     ] = "",
