@@ -1,6 +1,7 @@
 """Parameters as a person types them: `dx=-0.05:0.05, force=0.1:100:log, fingers=2:5:int, grip=pinch/power`.
 
-Choices are separated by "/", which needs no quotes in a shell, or by "|"."""
+Choices are separated by "/", which needs no quotes in a shell, or by "|".
+"""
 
 from collections.abc import Mapping
 from typing import Any
