@@ -205,7 +205,7 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("tell mug zero 1", "valid integer"),
         ("tell mug -1 1", "0 or more"),
         ("tell mug 0 1 --reachd dx=0", "reachd"),
-        ("tell mug 0 1 --reached dx=9", "outside its range"),
+        ("tell mug 0 1 --reached dx=nan", "finite number"),
         ("tell mug 0 1 --reached dz=0", "'dz' is unknown"),
         ("tell mug 0 1 --reached dx", "not of the form"),
         ("veto mug 5", "not in study"),

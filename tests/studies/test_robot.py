@@ -13,7 +13,7 @@ from optuna.trial import TrialState
 
 import surehold as sh
 from surehold.errors import InputError
-from surehold.studies.history import REACHED
+from surehold.studies.history import REACHED, history_of
 from surehold.studies.ledger import VETOED
 from surehold.studies.robot import NothingToAsk, RobotStudy
 from surehold.studies.search_space import SearchSpace
@@ -138,6 +138,19 @@ def test_an_answer_quicker_than_a_veto_counts(robot):
         robot.veto(asked.id)
 
 
+def test_what_was_reached_outside_of_its_range_is_learnt_from_there(robot):
+    asked = robot.ask()
+    robot.tell(asked.id, 0.5, reached={"dx": 0.06})
+    with robot.sampler.optimizing(
+        robot.settings.space, history_of(robot.trials(), robot.settings.space, True)
+    ) as model:
+        assert model.reached[0, 0] == pytest.approx(0.06)
+        assert model.X[0, 0] == pytest.approx(asked.parameters["dx"])
+    single = float(np.float32(0.05))
+    assert single > 0.05
+    assert robot.settings.space.check({"dx": single, "dy": 0.0})["dx"] == 0.05
+
+
 def test_what_was_reached_is_what_the_model_learns_from(robot):
     asked = robot.ask()
     robot.tell(asked.id, 0.5, reached={"dx": 0.02})
@@ -158,7 +171,6 @@ def test_what_was_reached_is_what_the_model_learns_from(robot):
         ({"value": [1.0, 2.0]}, "finite"),
         ({}, "has no value"),
         ({"value": 1.0, "failed": True}, "has no value, but"),
-        ({"value": 1.0, "reached": {"dx": 0.06}}, "outside its range"),
         ({"value": 1.0, "reached": {"dx": math.nan}}, "finite"),
         ({"value": 1.0, "reached": {"dz": 0.0}}, "'dz' is unknown"),
         ({"value": 1.0, "id": 1}, "trial 1 is not in study 'mug'; the last one is 0"),

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from optuna.trial import FrozenTrial, TrialState
 
+from surehold.errors import InputError
 from surehold.studies.search_space import SearchSpace
 
 __all__ = ["REACHED", "History", "history_of", "parameters_of"]
@@ -61,14 +62,17 @@ def history_of(trials: Iterable[FrozenTrial], space: SearchSpace, maximize: bool
         value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
         told.append(parameters)
         actual = parameters | trial.user_attrs.get(REACHED, {})
-        reached.append(actual if space.contains(actual) else parameters)
+        try:
+            reached.append(space.check(actual, anywhere=True))
+        except InputError:  # of other parameters, written by somebody else
+            reached.append(parameters)
         values.append(value if np.isfinite(value) else np.nan)
         numbers.append(trial.number)
     y = np.array(values, dtype=np.float64)
     return History(
         space.encode_all(told),
         y if maximize else -y,
-        space.encode_all(reached),
+        space.encode_all(reached, anywhere=True),
         space.encode_all(pending),
         np.array(numbers, dtype=np.intp),
     )

@@ -141,7 +141,7 @@ class Ledger:
         """Store an answer; see `RobotStudy.tell`."""
         number = checked_value(value, failed)
         trial = self.trial(id)
-        actual = None if reached is None else self._space.check(trial.params | dict(reached), "reached")
+        actual = None if reached is None else self._space.check(trial.params | dict(reached), "reached", anywhere=True)
         if trial.state == TrialState.WAITING:
             raise AnswerRefused(f"trial {id} has not been handed out yet; ask for it first.")
         state = "failed" if number is None else "complete"

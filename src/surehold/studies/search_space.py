@@ -126,12 +126,12 @@ class SearchSpace:
         """Return the point (d,) of the box for parameters that are inside; see `check`."""
         return self.encode_all([parameters])[0]
 
-    def encode_all(self, rows: list[Mapping[str, Any]]) -> NDArray[np.float64]:
-        """Return the points (n, d) of the box for n sets of parameters."""
+    def encode_all(self, rows: list[Mapping[str, Any]], anywhere: bool = False) -> NDArray[np.float64]:
+        """Return the points (n, d) of the box for n sets of parameters; `anywhere`, numbers may lie outside of it."""
         X = np.zeros((len(rows), 0 if self.box is None else self.box.dimension))
         for column, numeric in self._numeric:
             values = np.array([row[numeric.name] for row in rows], dtype=np.float64)
-            X[:, column] = numeric.to_coordinate(np.clip(values, numeric.low, numeric.high))
+            X[:, column] = numeric.to_coordinate(values if anywhere else np.clip(values, numeric.low, numeric.high))
         for column, name, distribution in self._choices:
             taken = np.array([int(distribution.to_internal_repr(row[name])) for row in rows], dtype=np.intp)
             X[np.arange(len(rows)), column + taken] = 1.0
@@ -155,8 +155,13 @@ class SearchSpace:
             for name, distribution in self.distributions.items()
         )
 
-    def check(self, parameters: Mapping[str, Any], what: str = "parameters") -> dict[str, Any]:
+    def check(
+        self, parameters: Mapping[str, Any], what: str = "parameters", *, anywhere: bool = False
+    ) -> dict[str, Any]:
         """Return the parameters in the order of this space, numbers given as text or integers converted.
+
+        A number beyond a bound by no more than the rounding of single precision is the bound. `anywhere`: numbers that
+        were reached, not commanded, may lie outside of their ranges and between levels.
 
         Raises
         ------
@@ -171,7 +176,7 @@ class SearchSpace:
         missing = [name for name in self.distributions if name not in parameters]
         if missing:
             raise InputError(f"{what} say nothing about {', '.join(missing)}; give a value for each parameter.")
-        return {name: _checked(name, d, parameters[name], what) for name, d in self.distributions.items()}
+        return {name: _checked(name, d, parameters[name], what, anywhere) for name, d in self.distributions.items()}
 
     def input_noise(self, noise: InputNoise | None) -> InputNoise | None:
         """Return noise that was given for the numbers of this space as noise of its box, none on choices.
@@ -258,7 +263,7 @@ def _holds(distribution: BaseDistribution, value: Any) -> bool:
         return False
 
 
-def _checked(name: str, distribution: BaseDistribution, value: Any, what: str) -> Any:
+def _checked(name: str, distribution: BaseDistribution, value: Any, what: str, anywhere: bool) -> Any:
     if isinstance(distribution, CategoricalDistribution):
         for choice in distribution.choices:
             if value == choice and isinstance(value, bool) == isinstance(choice, bool):
@@ -267,7 +272,7 @@ def _checked(name: str, distribution: BaseDistribution, value: Any, what: str) -
         if isinstance(value, str) and value in texts:
             return texts[value]
         raise unknown_name(f"choice for '{name}'", value, texts)
-    low, high, step, _ = _numeric(name, distribution)[1:]
+    low, high, step, log = _numeric(name, distribution)[1:]
     try:
         if isinstance(value, bool):
             raise TypeError
@@ -276,7 +281,11 @@ def _checked(name: str, distribution: BaseDistribution, value: Any, what: str) -
         raise InputError(f"{what}: {name} is {value!r}; give a number between {low:g} and {high:g}.") from None
     if not np.isfinite(number):
         raise InputError(f"{what}: {name} is {value!r}; give a finite number between {low:g} and {high:g}.")
-    slack = 1e-9 * (high - low)
+    if anywhere and not distribution.single():
+        if log and number <= 0.0:
+            raise InputError(f"{what}: {name} = {number:g}; its logarithm is needed: give a number above 0.")
+        return number
+    slack = 1e-9 * (high - low) + min(2.0**-23 * max(abs(low), abs(high)), 1e-3 * (high - low))  # as in Box.rounding
     if not low - slack <= number <= high + slack:
         raise InputError(f"{what}: {name} = {number:g} lies outside its range from {low:g} to {high:g}.")
     number = min(max(number, low), high)

@@ -112,7 +112,7 @@ def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: boo
         try:
             checked_value(trial.value, trial.failed)
             commanded = study.settings.space.check(trial.parameters)
-            study.settings.space.check(commanded | dict(trial.reached), "reached")
+            study.settings.space.check(commanded | dict(trial.reached), "reached", anywhere=True)
             good.append(trial)
         except InputError as error:
             if not skip_bad:
