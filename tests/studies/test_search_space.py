@@ -142,3 +142,9 @@ def test_bad_spaces_are_refused(bad):
 def test_infinite_distributions_are_refused():
     with pytest.raises(InputError, match="finite"):
         SearchSpace({"x": FloatDistribution(0.0, math.inf)})
+
+
+def test_bounds_in_single_precision_are_the_bounds():
+    single = float(np.float32(0.05))
+    assert single > 0.05
+    assert SearchSpace({"dx": (-0.05, 0.05)}).check({"dx": single}) == {"dx": 0.05}

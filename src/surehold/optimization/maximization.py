@@ -250,7 +250,8 @@ def _count(name: str, value: int) -> int:
 def _optimizer(box: Box, n_trials: int, settings: dict[str, Any]) -> Optimizer:
     optimizer = Optimizer(box, **settings)
     if settings.get("n_initial") is None and optimizer.n_initial > n_trials:
-        optimizer = Optimizer(box, **(settings | {"n_initial": n_trials}))
+        fewer: dict[str, Any] = {**settings, "n_initial": n_trials}
+        optimizer = Optimizer(box, **fewer)
     if optimizer.n_initial > n_trials:
         raise InputError(
             f"n_initial is {optimizer.n_initial}, but n_trials is {n_trials}; "

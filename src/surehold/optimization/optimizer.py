@@ -388,9 +388,8 @@ class Optimizer:
         trials = np.concatenate([self._trials.commanded, self._trials.pending])
 
         def unused(place: int) -> bool:  # on a lattice several places may be one point
-            return np.count_nonzero(same(design[place], trials)) <= np.count_nonzero(
-                same(design[place], design[:place])
-            )
+            earlier = same(design[place], design[:place])
+            return bool(np.count_nonzero(same(design[place], trials)) <= np.count_nonzero(earlier))
 
         return position if unused(position) else next(filter(unused, range(self.n_initial)), position)
 

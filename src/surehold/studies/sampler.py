@@ -220,7 +220,7 @@ class Sampler(BaseSampler):
             raise InputError("every parameter can take one value only; there is nothing to optimize.")
         noise = space.input_noise(self._input_noise)
         surrogate = self._surrogate_for(trials)
-        settings = self._settings | {"n_initial": self.n_initial(space)}
+        settings: dict[str, Any] = {**self._settings, "n_initial": self.n_initial(space)}
         return Optimizer(space.box, input_noise=noise, surrogate=surrogate, lattice=space.lattice, **settings)
 
     def __getstate__(self) -> dict[str, Any]:

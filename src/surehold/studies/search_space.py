@@ -162,7 +162,8 @@ class SearchSpace:
         Raises
         ------
         InputError
-            If one is missing, unknown, of the wrong kind, not finite or outside its range.
+            If one is missing, unknown, of the wrong kind, not finite or outside its range by more than the rounding of
+            single precision.
         """
         if not isinstance(parameters, Mapping):
             raise InputError(f"{what} are {parameters!r}; give {{name: value}} for {', '.join(self.distributions)}.")
@@ -316,7 +317,7 @@ def _checked(name: str, distribution: BaseDistribution, value: Any, what: str) -
         raise unknown_name(f"choice for '{name}'", value, texts)
     low, high, step, _ = _numeric(name, distribution)[1:]
     number = _number(name, value, what, f"a finite number between {low:g} and {high:g}")
-    slack = 1e-9 * (high - low)
+    slack = 1e-9 * (high - low) + min(2.0**-23 * max(abs(low), abs(high)), 1e-3 * (high - low))  # as in Box.rounding
     if not low - slack <= number <= high + slack:
         raise InputError(f"{what}: {name} = {number:g} lies outside its range from {low:g} to {high:g}.")
     number = min(max(number, low), high)
