@@ -1,3 +1,4 @@
+import os
 import re
 from pathlib import Path
 
@@ -131,3 +132,47 @@ def test_claims_name_cells_that_exist():
         plan = load_plan(claim.plan)
         assert claim.problem in plan.problems, claim
         assert {claim.better, claim.than} <= set(plan.methods), claim
+
+
+def bomb():
+    """Nine lists of nine times the one before: 3e9 values in 800 characters."""
+    lists = ["k0: &a0 [y,y,y,y,y,y,y,y,y]"]
+    lists += [f"k{i}: &a{i} [{','.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 10)]
+    return "title: t\nproblems:\n  r:\n    arguments:\n      " + "\n      ".join(lists) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (bomb(), "more than 100,000 values"),
+        ("a: &a [*a]", "more than 100,000 values"),
+        ("a: " + "[" * 50_000, "too deeply"),
+        ("a: " + "[" * 50_000 + "]" * 50_000, "longer than|too deeply"),
+        ("# " + "x" * 200_000, "longer than"),
+        ('title: "\\ud800"', "no Unicode"),
+        ("title: 2001-99-99", "no YAML"),
+        ("runs: 1" + "0" * 400, "bits"),
+        ("runs: 1" + "0" * 5000, "no YAML"),
+    ],
+    ids=["aliases", "an endless alias", "open", "deep", "long", "surrogate", "date", "large", "larger"],
+)
+def test_plans_without_limits_are_refused(text, message):
+    with pytest.raises(InputError, match=message):
+        parse_plan(text, "bad")
+
+
+@pytest.mark.parametrize("runs", ["1000000000", "10001"])
+def test_runs_have_a_limit(cheap_text, runs):
+    with pytest.raises(InputError, match="from 1 to 10,000"):
+        parse_plan(
+            f"{cheap_text}\nruns: {runs}\n"
+            if "runs:" not in cheap_text
+            else re.sub(r"runs: \d+", f"runs: {runs}", cheap_text),
+            "cheap",
+        )
+
+
+def test_a_pipe_is_no_plan_file(tmp_path):
+    os.mkfifo(tmp_path / "plan.yaml")
+    with pytest.raises(InputError, match="is no file"):
+        load_plan(str(tmp_path / "plan.yaml"))

@@ -1,4 +1,5 @@
 import json
+import os
 import re
 import signal
 import subprocess
@@ -30,6 +31,13 @@ def stopped(x):
     calls += 1
     if calls == 9:
         os.kill(os.getpid(), signal.SIGINT)
+    return float(-x[0])
+
+def terminated(x):
+    global calls
+    calls += 1
+    if calls == 9:
+        os.kill(os.getpid(), signal.SIGTERM)
     return float(-x[0])
 
 def stopped_at_once(x):
@@ -133,7 +141,13 @@ def test_trials_that_raise_are_failures_and_the_run_goes_on(here, capsys):
 
 
 def test_all_trials_failed(capsys):
-    assert surehold("maximize own.py:hopeless --bounds a=0:1 --trials 6") == 1
+    line = "maximize own.py:hopeless --bounds a=0:1 --trials 6"
+    assert surehold(line) != 0
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "first 3 trials failed" in error
+    assert "give --tolerate-failures" in error
+    assert surehold(f"{line} --tolerate-failures") == 1
     error = capsys.readouterr().err
     assert "all 6 trials failed" in error
     assert "no robot here" in error
@@ -156,6 +170,35 @@ def test_interrupt_keeps_what_was_done(here, capsys):
     assert data["interrupted"]
     assert len(data["trials"]["y"]) == 8
     assert "was interrupted after 8" in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_sigterm_keeps_what_was_done(here):
+    line = "maximize own.py:terminated --bounds a=0:1 --trials 30 --initial 6"
+    done = subprocess.run(
+        [sys.executable, "-m", "surehold", *line.split()], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    data = json.loads((here / "runs" / "terminated-ubo-seed0" / "result.json").read_text())
+    assert data["interrupted"]
+    assert len(data["trials"]["y"]) == 8
+
+
+def test_another_run_gets_another_folder(here, capsys):
+    line = "maximize own.py:hill --bounds a=0:1 --trials 8 --initial 6 --method bo --noise none"
+    assert surehold(line) == 0
+    before = (here / "runs" / "hill-bo-seed0" / "result.json").read_bytes()
+    assert surehold(line.replace("a=0:1", "a=0:2")) == 0
+    assert surehold(line) == 0
+    assert "runs/hill-bo-seed0-3/report.html" in capsys.readouterr().out
+    assert (here / "runs" / "hill-bo-seed0" / "result.json").read_bytes() == before
+    assert (here / "runs" / "hill-bo-seed0-2" / "result.json").read_bytes() != before
+    assert (here / "runs" / "hill-bo-seed0-3" / "result.json").read_bytes() == before
+
+
+def test_a_run_that_gave_nothing_leaves_no_empty_folder(here, capsys):
+    assert surehold("maximize own.py:hopeless --bounds a=0:1 --trials 6") != 0
+    assert not list((here / "runs").iterdir())
+    capsys.readouterr()
 
 
 @pytest.mark.usefixtures("interruptible")
@@ -191,6 +234,20 @@ def test_a_short_grasp_run(here, capsys):
     page = (here / "mug" / "report.html").read_text(encoding="utf-8")
     assert "scene-data" in page
     assert "the hand is off" in page
+
+
+def test_a_run_without_any_grasp_says_so_first(here, capsys):
+    line = "grasp mug --friction 0.001 --contact single --trials 3 --initial 3 --out slippery"
+    assert surehold(line) == 3
+    out = " ".join(capsys.readouterr().out.split())
+    assert "None of 3 trials succeeded" in out
+    assert "× not closed" in out
+    assert "Try another --facet" in out
+    assert "refused" not in out
+    assert out.index("None of 3 trials") < out.index("pose")
+    page = (here / "slippery" / "report.html").read_text(encoding="utf-8")
+    assert '<p class="headline">None of 3 trials succeeded' in page
+    assert "No success: " in page
 
 
 def test_doctor_version_and_help(capsys):
@@ -236,3 +293,23 @@ def test_a_closed_pipe_does_not_end_the_run(here):
         assert process.stderr.read() == ""
     assert process.returncode == 0
     assert (here / "piped" / "report.html").is_file()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+def test_a_full_output_does_not_end_the_run(here):
+    line = [sys.executable, "-m", "surehold", "maximize", "gf", "--trials", "22", "--out", "full"]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert "the output cannot be written (No space left on device)" in done.stderr
+    assert done.returncode == 0
+    assert (here / "full" / "report.html").is_file()
+
+
+def test_output_in_ascii(here):
+    line = [sys.executable, "-m", "surehold", "maximize", "gf", "--trials", "22", "--out", "plain"]
+    done = subprocess.run(line, capture_output=True, env={**os.environ, "PYTHONIOENCODING": "ascii"}, check=False)
+    assert done.returncode == 0, done.stderr
+    text = done.stdout.decode("ascii")
+    assert "+/-" in text
+    assert (here / "plain" / "report.html").is_file()

@@ -205,7 +205,7 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("tell mug zero 1", "valid integer"),
         ("tell mug -1 1", "0 or more"),
         ("tell mug 0 1 --reachd dx=0", "reachd"),
-        ("tell mug 0 1 --reached dx=9", "outside its range"),
+        ("tell mug 0 1 --reached dx=1e300", "can be reached"),
         ("tell mug 0 1 --reached dz=0", "'dz' is unknown"),
         ("tell mug 0 1 --reached dx", "not of the form"),
         ("veto mug 5", "not in study"),
@@ -219,7 +219,12 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("import mug --study gone", "does not exist"),
         ("recommend mug", "no trial has given a value yet"),
         ("work mug", "says nothing about what its trials are"),
-        ("serve mug --token short", "16 printable"),
+        ("serve mug --token-file own.py", "chmod 600"),
+        ("create new --parameters n=0:1" + "0" * 400 + ":int", "bounds are finite numbers up to 1e.100"),
+        ("create new --parameters x=0:1e308", "bounds are finite numbers up to 1e.100"),
+        ("create new --parameters x=0:1 --initial 1000000000", "100,000 trials at most"),
+        ("tell mug 0 1e308", "another unit"),
+        ("tell mug 0 1" + "0" * 5000, "finite"),
         ("serve mug --port 70000", "65535"),
     ],
 )
@@ -314,3 +319,56 @@ def test_a_grasp_is_kept_and_worked_on(study):
     problem = sh.problems.Grasp("mug", quality="volume", closing="synergy")
     for trial in trials[3:]:  # one made by the command, two by the worker from what the study says of the problem
         assert trial["value"] == problem([trial["dx"], trial["dy"]])
+
+
+def test_tokens_are_not_taken_from_the_command_line_in_silence(tmp_path, monkeypatch, capsys):
+    from surehold.studies.service import Server
+
+    monkeypatch.setattr(Server, "run", lambda self, application: None)
+    assert run(["study", "create", "rig", "--parameters", "x=0:1"]) == 0
+    capsys.readouterr()
+    assert run(["study", "serve", "rig", "--port", "0", "--token", "0123456789abcdef"]) == 0
+    assert "all users of this machine see the token" in capsys.readouterr().err
+    monkeypatch.setenv("SUREHOLD_TOKEN", "0123456789abcdef")
+    assert run(["study", "serve", "rig", "--port", "0"]) == 0
+    assert capsys.readouterr().err == ""
+    monkeypatch.delenv("SUREHOLD_TOKEN")
+    secret = tmp_path / "secret"
+    secret.write_text("0123456789abcdef\n")
+    secret.chmod(0o640)
+    assert run(["study", "serve", "rig", "--port", "0", "--token-file", str(secret)]) == 2
+    assert "mode 640" in capsys.readouterr().err
+    secret.chmod(0o600)
+    assert run(["study", "serve", "rig", "--port", "0", "--token-file", str(secret)]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert "0123456789abcdef" not in captured.out
+    assert run(["study", "serve", "rig", "--port", "0", "--token-file", "gone"]) == 2
+    assert "cannot be read" in capsys.readouterr().err
+
+
+def test_texts_that_a_spreadsheet_would_compute(here, capsys):
+    create = ["--parameters", "x=-1:1,grip==SUM(A1)|-2|@home", "--noise", "none"]
+    assert run(["study", "create", "rig", *create]) == 0
+    assert run(["study", "add", "rig", "--at", "x=-0.5,grip==SUM(A1)", "-0.25"]) == 0
+    assert run(["study", "add", "rig", "--at", "x=0.5,grip=-2", "0.25"]) == 0
+    assert run(["study", "ask", "rig"]) == 0
+    assert run(["study", "veto", "rig", "2", "--reason", "=HYPERLINK(1)"]) == 0
+    assert run(["study", "export", "rig", "--out", "rig.csv"]) == 0
+    text = (here / "rig.csv").read_text()
+    assert ",-0.25,-0.5,'=SUM(A1)," in text, "a negative number is a number"
+    assert "'=HYPERLINK(1)" in text
+    assert run(["study", "create", "again", *create]) == 0
+    assert run(["study", "import", "again", "rig.csv"]) == 0
+    capsys.readouterr()
+    assert run(["study", "export", "again", "--json"]) == 0
+    trials = json.loads(capsys.readouterr().out)["trials"]
+    assert [t["grip"] for t in trials[:2]] == ["=SUM(A1)", "-2"]
+
+
+def test_choices_need_no_quotes(capsys):
+    """A "|" is a pipe in a shell."""
+    assert run(["study", "create", "rig", "--parameters", "x=0:1,grip=pinch/power", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["parameters"]["grip"]["attributes"]["choices"] == ["pinch", "power"]
+    assert run(["study", "create", "old", "--parameters", "grip=a/b|c", "--noise", "none", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["parameters"]["grip"]["attributes"]["choices"] == ["a/b", "c"]

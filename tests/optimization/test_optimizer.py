@@ -333,7 +333,7 @@ def test_bad_trials_lose_nothing(arguments, words):
     with pytest.raises(InputError):
         optimizer.tell([0.0, 5.0], 1.0, failed=True)
     with pytest.raises(InputError, match="reached"):
-        optimizer.tell([0.0, 5.0], 1.0, reached=[9.0, 9.0])
+        optimizer.tell([0.0, 5.0], 1.0, reached=[9.0, np.inf])
     assert optimizer.y.tolist() == [1.0]
     np.testing.assert_allclose(optimizer.pending, [waiting])
 

@@ -3,6 +3,7 @@ import pytest
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.optimization.surrogates.protocol import mixture
 from surehold.problems import GaussianBumps, robust_score
 from surehold.reports import gather
 
@@ -68,3 +69,24 @@ def test_failed_trials_leave_holes():
     assert report.noise is None
     with pytest.raises(InputError, match="no variable"):
         gather.report_of(result, report.candidates, title="t", settings={}, noise=None, units={"y": "m"})
+
+
+def test_varying_noise_is_taken_at_the_point_shown():
+    """Noise that is 0.1 at x = 0 and 0.01 at x = 1: the ring and the averaged model must follow it."""
+    box = sh.Box({"x": (0.0, 1.0), "y": (-1.0, 1.0)})
+    noise = sh.InputNoise.varying(lambda x: {"x": 0.1 - 0.09 * x[0], "y": 0.02})
+    result = sh.maximize(lambda x: float(np.sin(9.0 * x[0])), box, n_trials=14, n_initial=12, input_noise=noise, seed=0)
+    shown = [gather.candidate(result, label, i, None) for label, i in (("highest observed", 0), ("recommended", 1))]
+    report = gather.report_of(result, shown, title="t", settings={}, noise=noise)
+    for candidate in report.candidates:
+        expected = np.diag([0.1 - 0.09 * candidate.x[0], 0.02]) ** 2
+        assert candidate.noise == pytest.approx(expected, rel=1e-9)
+    assert report.noise is report.candidates[1].noise
+    surface = report.surfaces[0]
+    i, j = 10, 40
+    place = np.array([surface.axes[0][i], surface.axes[1][j]])
+    d = (0.1 - 0.09 * place[0], 0.02)
+    # the unscented transformation with k = 1 by hand: 2d + 1 points, weights 1/3 and 1/6
+    points = [place, *(place + s * np.sqrt(3.0) * d[k] * np.eye(2)[k] for k in (0, 1) for s in (-1, 1))]
+    mean = mixture(result.optimizer.posterior.moments(box.to_unit(np.array(points))))[0]
+    assert surface.robust_mean[i, j] == pytest.approx(mean @ [1 / 3, 1 / 6, 1 / 6, 1 / 6, 1 / 6], rel=1e-6)

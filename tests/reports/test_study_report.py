@@ -98,7 +98,7 @@ def test_all_kinds_of_parameters_are_drawn(tmp_path):
 def test_choices_alone_have_a_page_without_maps(tmp_path):
     space = SearchSpace({"c": CategoricalDistribution(["a", "b", "c"]), "e": CategoricalDistribution([1, 2])})
     study = RobotStudy.create("choices", StudySettings(space), str(tmp_path / "j.log"))
-    for _ in range(4):
+    for _ in range(10):
         asked = study.ask()
         study.tell(asked.id, float(asked.parameters["e"]))
     report = study_report(study)

@@ -120,3 +120,50 @@ def test_change():
 def test_coordinates_use_readable_units():
     there = replace(shaken("recommended", 1.0, []), x=np.array([-0.01, np.pi / 2, 1.0]))
     assert coordinates(report(there), there) == "dx = −10.0 mm, rx = 90.0°, s = 1.00"
+
+
+def with_tail(label, quality, mean, worst, n=100):
+    """Re-queries that are alike but for two of a hundred, which a mean hardly shows and a tail does."""
+    values = np.full(n, mean) + 0.01 * np.sin(np.arange(n))
+    values[:2] = worst
+    return shaken(label, quality, values)
+
+
+def test_bad_cases_decide_where_the_means_are_alike():
+    """As `maximize rkhs` gives it: means of 4.84 and 4.94, the worst of a hundred 1.38 and 4.81."""
+    told = verdict(report(with_tail("highest observed", 5.5, 4.84, 1.38), with_tail("recommended", 4.95, 4.84, 4.81)))
+    assert told.refused
+    for part in ("refused", "falls to 1.38 at worst", "to 4.81"):
+        assert part in told.headline
+    told = verdict(report(with_tail("highest observed", 5.5, 4.84, 4.81), with_tail("recommended", 4.95, 4.84, 1.38)))
+    assert not told.refused
+    assert "the recommended one falls to 1.38 at worst, the other to 4.81" in told.headline
+
+
+def test_a_difference_of_bad_cases_counts_against_the_range_of_values():
+    pair = (with_tail("highest observed", 5.5, 4.84, 4.5), with_tail("recommended", 4.95, 4.84, 4.81))
+    assert "about the same: " in verdict(report(*pair, y=np.array([-5.0, 2.0, 5.5, np.nan]))).headline
+    assert "falls to 4.50" in verdict(report(*pair, y=np.array([4.0, 4.5, 5.5, np.nan]))).headline
+
+
+def test_a_better_mean_with_a_worse_tail_says_both():
+    told = verdict(report(with_tail("highest observed", 5.5, 4.0, 3.9), with_tail("recommended", 4.95, 4.9, 1.38)))
+    assert "worth only 4.00" in told.headline
+    assert "but falls to 1.38 at worst" in told.headline
+
+
+def test_without_any_success_nobody_wins():
+    told = verdict(
+        report(
+            shaken("highest observed", 0.0, SPREAD),
+            shaken("recommended", -1.0, 1.9 + SPREAD),
+            y=np.array([0.0, -1.0, -1.0, np.nan]),
+            success_above=0.0,
+            outcomes={"not closed": 1, "no contact": 3},
+            advice="Try another --facet.",
+        )
+    )
+    assert told.headline == "None of 4 trials succeeded: no value above 0 was met."
+    assert told.text.startswith("How they ended: 3 × no contact; 1 × not closed.")
+    assert told.text.endswith("Try another --facet.")
+    assert not told.refused

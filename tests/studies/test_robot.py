@@ -158,7 +158,7 @@ def test_what_was_reached_is_what_the_model_learns_from(robot):
         ({"value": [1.0, 2.0]}, "finite"),
         ({}, "has no value"),
         ({"value": 1.0, "failed": True}, "has no value, but"),
-        ({"value": 1.0, "reached": {"dx": 0.06}}, "outside its range"),
+        ({"value": 1.0, "reached": {"dx": 1e300}}, "can be reached"),
         ({"value": 1.0, "reached": {"dx": math.nan}}, "finite"),
         ({"value": 1.0, "reached": {"dz": 0.0}}, "'dz' is unknown"),
         ({"value": 1.0, "id": 1}, "trial 1 is not in study 'mug'; the last one is 0"),
@@ -462,3 +462,41 @@ def test_names_and_settings_that_cannot_be(tmp_path):
     with pytest.raises(InputError, match="criterion"):
         StudySettings(SearchSpace(BOX), optimizer={"criterion": "best"})
     assert not (tmp_path / "j.log").exists()
+
+
+def test_what_was_reached_outside_the_ranges_is_learnt_from_where_it_was(tmp_path):
+    """A loop of a robot that strays leaves the box now and then; nothing is refused, and nothing moved inside."""
+    from surehold.studies.history import history_of
+    from surehold.studies.status import to_csv
+    from surehold.studies.warm_start import import_trials, trials_of_csv
+
+    space = SearchSpace(
+        {"dx": (-0.05, 0.05), "n": IntDistribution(2, 5), "force": FloatDistribution(1.0, 100.0, log=True)}
+    )
+    settings = StudySettings(space, optimizer={"n_initial": 3})
+    robot = RobotStudy.create("mug", settings, str(tmp_path / "journal.log"))
+    places = [{"dx": 0.0625, "force": 200.0}, {"dx": -0.0625, "n": 1.5}, {"dx": 0.01}]
+    for place in places:
+        robot.tell(robot.ask().id, -abs(place["dx"]), reached=place)
+    history = history_of(robot.trials(), space, True)
+    assert history.reached[:, 0].tolist() == [0.0625, -0.0625, 0.01]
+    assert history.reached[1, 1] == 1.5
+    assert history.reached[0, 2] == pytest.approx(np.log(200.0))
+    assert (np.abs(history.X[:, 0]) <= 0.05).all()
+    optimizer = robot.sampler.optimizer(robot.study)
+    assert optimizer.posterior is not None
+    assert robot.ask().id == 3
+    assert robot.recommend().parameters["dx"] == 0.01, "an answer lies inside the ranges"
+    (tmp_path / "mug.csv").write_text(to_csv(robot))
+    again = RobotStudy.create("again", settings, str(tmp_path / "again.log"))
+    import_trials(again, trials_of_csv(str(tmp_path / "mug.csv"), {name: name for name in space.distributions}))
+    assert np.array_equal(history_of(again.trials(), space, True).reached, history.reached)
+
+
+@pytest.mark.parametrize(
+    "reached", [{"dx": float("nan")}, {"dx": "far"}, {"dx": 1e300}, {"dz": 0.0}, {"dx": True}, [0.0]]
+)
+def test_what_cannot_have_been_reached_is_refused(reached, tmp_path):
+    robot = RobotStudy.create("mug", StudySettings(SearchSpace({"dx": (-0.05, 0.05)})), str(tmp_path / "journal.log"))
+    with pytest.raises(InputError, match=r"reached|dz"):
+        robot.tell(robot.ask().id, 0.5, reached=reached)

@@ -10,6 +10,7 @@ from optuna.trial import TrialState, create_trial
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.studies.search_space import SearchSpace
 
 SPACE = {"x": FloatDistribution(0.0, 1.0), "k": IntDistribution(1, 6), "c": CategoricalDistribution(["a", "b"])}
 
@@ -208,3 +209,23 @@ def test_many_trials_are_carried_by_a_tree():
         study.add_trial(create_trial(params={"x": x}, distributions=space, value=float(np.sin(9 * x))))
     assert sampler.optimizer(study).posterior.diagnostics.partition.leaves > 1
     assert 0.0 <= study.ask(space).params["x"] <= 1.0
+
+
+def test_a_choice_counts_as_one_variable_in_the_size_of_the_design():
+    choices = {name: CategoricalDistribution(list("abcdefgh"[:k])) for name, k in (("s", 4), ("b", 4), ("l", 8))}
+    space = choices | {
+        "T": FloatDistribution(90, 120),
+        "conc": FloatDistribution(0.05, 0.16),
+        "only": IntDistribution(3, 3),
+    }
+    sampler = sh.Sampler(space, seed=0)
+    assert sampler.n_initial(SearchSpace(space)) == 25
+    study = new(sampler)
+    asked = run(study, 26, space, lambda p: -abs(p["T"] - 108.0) - (p["s"] != "a"))
+    assert len(asked) == 26
+    assert sampler.optimizer(study).n_initial == 25
+
+
+def test_input_noise_that_is_a_number_names_the_right_call():
+    with pytest.raises(InputError, match=r"InputNoise.unit\(0.03\)"):
+        sh.Sampler({"x": (0.0, 1.0), "grip": CategoricalDistribution(["a", "b"])}, input_noise=0.03)

@@ -113,14 +113,14 @@ def test_parameters_from_text_are_converted():
         ({"dx": 0.06}, "outside its range from -0.05 to 0.05"),
         ({"dx": math.nan}, "finite"),
         ({"dx": math.inf}, "finite"),
-        ({"dx": "far"}, "give a number"),
-        ({"dx": True}, "give a number"),
-        ({"dx": None}, "give a number"),
+        ({"dx": "far"}, "give a finite number"),
+        ({"dx": True}, "give a finite number"),
+        ({"dx": None}, "give a finite number"),
         ({"turn": 0.3}, "no level"),
         ({"fingers": 2.5}, "no level"),
         ({"grip": "pnch"}, "did you mean 'pinch'"),
         ({"dz": 0.0}, "'dz' is unknown"),
-        ({"dx": 10**400}, "give a number"),
+        ({"dx": 10**400}, "give a finite number"),
     ],
 )
 def test_bad_parameters_are_named(change, message):
@@ -142,3 +142,9 @@ def test_bad_spaces_are_refused(bad):
 def test_infinite_distributions_are_refused():
     with pytest.raises(InputError, match="finite"):
         SearchSpace({"x": FloatDistribution(0.0, math.inf)})
+
+
+def test_bounds_in_single_precision_are_the_bounds():
+    single = float(np.float32(0.05))
+    assert single > 0.05
+    assert SearchSpace({"dx": (-0.05, 0.05)}).check({"dx": single}) == {"dx": 0.05}

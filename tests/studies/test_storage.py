@@ -121,6 +121,33 @@ def test_half_a_line_of_a_journal_is_cut_off(tmp_path):
     optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(path)))
 
 
+@pytest.mark.parametrize(
+    "damage",
+    [b"garbage\n", b'{"op_code":4,"worker\n', b"\0" * 5000 + b"\n", b"5\n", b"\xff\xfe\n{}\n", b"[" * 50000 + b"\n"],
+    ids=["text", "half an operation", "zeros", "a number", "two lines", "deep"],
+)
+def test_a_damaged_last_line_with_its_newline_is_cut_off_before_anything_is_appended(damage, tmp_path):
+    path = tmp_path / "journal.log"
+    robot = RobotStudy.create("mug", SETTINGS, str(path))
+    robot.tell(robot.ask().id, 0.5)
+    whole = path.read_bytes()
+    path.write_bytes(whole + damage)
+    assert robot.ask().id == 1  # one that was open at that time
+    assert path.read_bytes().startswith(whole + b'{"op_code"')
+    path.write_bytes(path.read_bytes() + damage)
+    again = RobotStudy.open("mug", str(path))
+    again.tell(again.ask().id, 0.25)
+    assert [t.value for t in RobotStudy.open("mug", str(path)).trials()] == [0.5, None, 0.25]
+
+
+def test_a_file_of_somebody_else_keeps_its_lines(tmp_path):
+    path = tmp_path / "settings.json"
+    path.write_text('{"a": 1,\n "b": 2}\n')
+    with pytest.raises(InputError, match="cannot be read"):
+        RobotStudy.create("mug", SETTINGS, str(path))
+    assert path.read_text() == '{"a": 1,\n "b": 2}\n'
+
+
 HOLDING = """
 import sys, time
 from surehold.studies.storage import open_storage

@@ -21,6 +21,9 @@ __all__ = ["ClaimResult", "Comparison", "Row", "claim_results", "comparisons", "
 #: Measures that are better when they are low.
 LOWER: Final = ("std", "regret")
 _FEW: Final = 20  # common seeds below which a missing difference says little
+#: Smallest effect of interest: differences of means below this share of a problem's scale (`least_of`) are no verdict,
+#: however many seeds show them. Half of the 1 % within which a run counts as having found the maximum.
+SMALLEST_EFFECT: Final = 0.005
 LABELS: Final = {
     "best": "best observed value",
     "mean": "mean under input noise",
@@ -65,7 +68,7 @@ class Comparison:
     p: float
     """Holm-adjusted within the campaign"""
     verdict: str
-    """"better", "worse" or "no difference shown" """
+    """"better", "worse", "no difference of interest" (below `SMALLEST_EFFECT`) or "no difference shown" """
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,7 @@ def rows_of(records: Records) -> list[Row]:
                 )
             )
     adjusted = _holm_where([row.p for row in rows])
-    return [_judged(row, p) for row, p in zip(rows, adjusted, strict=True)]
+    return [_judged(row, p, least_of(records, row.problem)) for row, p in zip(rows, adjusted, strict=True)]
 
 
 def comparisons(records: Records) -> list[Comparison]:
@@ -158,7 +161,15 @@ def comparisons(records: Records) -> list[Comparison]:
                     found.append((problem, measure, method, difference))
     adjusted = holm([difference.p for *_, difference in found])
     return [
-        Comparison(problem, measure, method, methods[0], difference, p, _word(difference, p, measure))
+        Comparison(
+            problem,
+            measure,
+            method,
+            methods[0],
+            difference,
+            p,
+            _word(difference, p, measure, least_of(records, problem)),
+        )
         for (problem, measure, method, difference), p in zip(found, adjusted, strict=True)
     ]
 
@@ -176,7 +187,9 @@ def claim_results(campaigns: Mapping[str, Records]) -> list[ClaimResult]:
             ]
             adjusted = _holm_where([math.nan if t is None else t.p for t in told])
             results += [
-                ClaimResult(claim, name, t, p, word := _claim_word(claim, t, p), _reason(records, claim, t, word))
+                ClaimResult(
+                    claim, name, t, p, word := _claim_word(records, claim, t, p), _reason(records, claim, t, word)
+                )
                 for claim, t, p in zip(claims, told, adjusted, strict=True)
             ]
     return results
@@ -191,16 +204,34 @@ def _difference(records: Records, problem: str, method: str, reference: str, mea
     return paired([ours[seed] for seed in common], [theirs[seed] for seed in common])
 
 
-def _word(difference: Paired, p: float, measure: str) -> str:
+def least_of(records: Records, problem: str) -> float:
+    """Return the smallest difference of interest on a problem, in its outcomes' units.
+
+    `SMALLEST_EFFECT` of the known maximum of a synthetic function; elsewhere, of the highest mean that any method of
+    the campaign reached (of the best observed value, or of the first measure where that is not recorded).
+    """
+    cells = [cell for cell in records.header["cells"] if cell["problem"] == problem]
+    if cells[0]["function"] in SYNTHETIC:
+        return SMALLEST_EFFECT * abs(synthetic_function(cells[0]["function"]).optimum.value)
+    for measure in ("best", *measures_of(records)):
+        values = [list(final_values(records, problem, cell["method"], measure).values()) for cell in cells]
+        if any(values):
+            return SMALLEST_EFFECT * max(abs(float(np.mean(v))) for v in values if v)
+    return 0.0
+
+
+def _word(difference: Paired, p: float, measure: str, least: float) -> str:
     if not p < LEVEL or difference.r == 0.0:
         return "no difference shown"
+    if abs(difference.mean) < least:
+        return "no difference of interest"
     return "better" if (difference.r > 0.0) != (measure in LOWER) else "worse"
 
 
-def _claim_word(claim: Claim, difference: Paired | None, p: float) -> str:
-    if difference is None:
+def _claim_word(records: Records | None, claim: Claim, difference: Paired | None, p: float) -> str:
+    if records is None or difference is None:
         return "no runs"
-    word = _word(difference, p, claim.measure)
+    word = _word(difference, p, claim.measure, least_of(records, claim.problem))
     if word == "no difference shown" and difference.n < _FEW:
         return "too few runs"
     if claim.expected == "no better":
@@ -211,6 +242,14 @@ def _claim_word(claim: Claim, difference: Paired | None, p: float) -> str:
 def _reason(records: Records | None, claim: Claim, difference: Paired | None, word: str) -> str:
     if records is None or difference is None or word not in ("not shown", "contradicted"):
         return ""
+    least = least_of(records, claim.problem)
+    if 0.0 < abs(difference.mean) < least:
+        small = f"the difference is below the smallest of interest, {number(least, 2)}"
+        return "; ".join(filter(None, (_seen(records, claim, difference, word), small)))
+    return _seen(records, claim, difference, word)
+
+
+def _seen(records: Records, claim: Claim, difference: Paired, word: str) -> str:
     function = next(cell["function"] for cell in records.header["cells"] if cell["problem"] == claim.problem)
     if claim.measure == "best" and function in SYNTHETIC:
         return _near_the_maximum(records, claim, function)
@@ -258,12 +297,12 @@ def _seeds_needed(difference: Paired) -> int:
     return math.ceil(difference.n * (z * difference.se / difference.mean) ** 2)
 
 
-def _judged(row: Row, p: float) -> Row:
+def _judged(row: Row, p: float, least: float) -> Row:
     verdict = ""
     if row.ours is not None and row.theirs is not None:
         gap = row.ours.mean - row.theirs.mean
         rounded = abs(gap) <= 0.5 * row.theirs.unit
-        if rounded or p >= LEVEL:
+        if rounded or p >= LEVEL or abs(gap) < least:
             verdict = "agrees"
         elif math.isnan(p):
             verdict = ""

@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple
 from surehold.errors import InputError, unknown_name
 
 __all__ = ["Cell", "MethodSetup", "Plan", "ProblemSetup", "Task", "share_of"]
+_MOST_RUNS, _MOST_TRIALS = 10_000, 100_000  # more is a slip of the pen: lists of runs and trials are held in memory
 
 
 @dataclass(frozen=True)
@@ -114,11 +115,11 @@ class Plan:
     def __post_init__(self) -> None:
         if not self.problems or not self.methods:
             raise InputError(f"plan '{self.name}' has no {'methods' if self.problems else 'problems'}; name one.")
-        _whole(f"runs of plan '{self.name}'", self.runs)
+        _whole(f"runs of plan '{self.name}'", self.runs, _MOST_RUNS)
         for label, on in self.problems.items():
             where = f"of problem '{label}' in plan '{self.name}'"
             for name in ("trials", "initial", "requeries"):
-                _whole(f"{name} {where}", getattr(on, name))
+                _whole(f"{name} {where}", getattr(on, name), _MOST_TRIALS)
             if on.initial > on.trials:
                 raise InputError(f"initial {where} is {on.initial}, but trials is {on.trials}; give at most as many.")
             if on.input_noise not in (None, "own") and not 0.0 < float(on.input_noise) < 1.0:
@@ -162,7 +163,7 @@ class Plan:
         InputError
             For fewer than one run, or a share that does not exist.
         """
-        count = _whole("runs", self.runs if runs is None else runs)
+        count = _whole("runs", self.runs if runs is None else runs, _MOST_RUNS)
         i, n = shard
         if not 1 <= i <= n:
             raise InputError(f"shard is {i}/{n}; give i/n with i from 1 to n, such as 2/8.")
@@ -199,7 +200,7 @@ def _plain(value: Any) -> Any:
     return "inf" if value == float("inf") else value  # JSON has no infinity
 
 
-def _whole(name: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise InputError(f"{name} is {value!r}; give a whole number of 1 or more.")
+def _whole(name: str, value: Any, most: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+        raise InputError(f"{name} is {str(value)[:60]}; give a whole number from 1 to {most:,}.")
     return value

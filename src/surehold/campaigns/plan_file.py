@@ -16,6 +16,7 @@ from surehold.errors import InputError, unknown_name
 
 __all__ = ["load_plan", "parse_plan", "shipped_plans"]
 
+_LONGEST, _LARGEST = 100_000, 100_000  # characters and values of a plan; the shipped ones have a hundredth
 _PLANS: Final = files("surehold.campaigns") / "plans"
 
 
@@ -49,8 +50,11 @@ def load_plan(reference: str) -> Plan:
         return _checked(plan)
     if reference.endswith((".yaml", ".yml")):
         path = Path(reference)
+        if path.exists() and not path.is_file():  # a pipe or a device may never end
+            raise InputError(f"plan file '{path}' is no file; give a file of YAML.")
         try:
-            text = path.read_text(encoding="utf-8")
+            with open(path, encoding="utf-8") as file:
+                text = file.read(_LONGEST + 1)
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"plan file '{path}' cannot be read ({getattr(error, 'strerror', error)}).") from None
         return parse_plan(text, path.stem)
@@ -73,10 +77,15 @@ def parse_plan(text: str, name: str) -> Plan:
 def _document(text: str, name: str) -> dict[str, Any]:
     import yaml
 
+    if len(text) > _LONGEST:
+        raise InputError(f"plan '{name}' is longer than {_LONGEST:,} characters; split it.")
     try:
         document = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise InputError(f"plan '{name}' is no YAML: {' '.join(str(error).split())}") from None
+    except (yaml.YAMLError, ValueError, OverflowError) as error:  # ValueError: a date or a number that is none
+        raise InputError(f"plan '{name}' is no YAML: {' '.join(str(error).split())[:300]}") from None
+    except RecursionError:
+        raise InputError(f"plan '{name}' is nested too deeply; a plan has five levels.") from None
+    _check_size(document, name)
     if not isinstance(document, dict):
         raise InputError(f"plan '{name}' is {type(document).__name__}; give title, problems and methods.")
     base = document.pop("extends", None)
@@ -85,6 +94,29 @@ def _document(text: str, name: str) -> dict[str, Any]:
     if base not in shipped_plans():
         raise unknown_name(f"plan that '{name}' extends", base, shipped_plans())
     return _merged(_document((_PLANS / f"{base}.yaml").read_text(encoding="utf-8"), base), document)
+
+
+def _check_size(document: Any, name: str) -> None:
+    """Raise InputError where a document is no tree of a plan's size: its aliases (*name) may make it endless."""
+    waiting, values = [document], 0
+    while waiting:
+        value = waiting.pop()
+        values += 1
+        if values > _LARGEST:
+            raise InputError(
+                f"plan '{name}' holds more than {_LARGEST:,} values with its aliases; write a smaller one."
+            )
+        if isinstance(value, dict):
+            waiting += [*value, *value.values()]
+        elif isinstance(value, list | tuple | set):
+            waiting += value
+        elif isinstance(value, str) and not value.isascii():
+            try:
+                value.encode()
+            except UnicodeEncodeError:
+                raise InputError(f"plan '{name}' holds the text {value[:60]!r}, which is no Unicode.") from None
+        elif isinstance(value, int) and abs(value) > 1e300:
+            raise InputError(f"plan '{name}' holds a whole number of {value.bit_length()} bits; give a smaller one.")
 
 
 def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from surehold.campaigns.comparison import (
     LABELS,
+    SMALLEST_EFFECT,
     Comparison,
     Row,
     claim_results,
@@ -40,6 +41,7 @@ _MARKS: Final[dict[str, Mark]] = {
     "worse": "bad",
     "not shown": "open",
     "no difference shown": "open",
+    "no difference of interest": "open",
     "too few runs": "open",
     "no runs": "open",
     "": "",
@@ -214,7 +216,8 @@ def claims_table(campaigns: Mapping[str, Records]) -> Table:
     head = ("claim of the thesis", "settings", "common seeds", "difference ± se", "p", "what is seen", "verdict")
     note = (
         "Wilcoxon's signed-rank test on common seeds, Holm-adjusted within a table of the thesis. A claim of no gain "
-        "holds unless a gain is shown by 20 seeds or more."
+        f"holds unless a gain is shown by 20 seeds or more. Differences below {100.0 * SMALLEST_EFFECT:g} % of the "
+        "known maximum (of grasps: of the highest mean) are no gain and no loss, however sure they are."
     )
     return Table("claims", "The thesis' claims", head, tuple(body), tuple(marks), note)
 

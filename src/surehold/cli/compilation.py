@@ -50,4 +50,4 @@ def warm_up(problem: Any, settings: dict[str, Any]) -> None:
         own()
     few = {**settings, "n_initial": 4}
     center = problem.box.from_unit([0.5] * problem.box.dimension)
-    maximize(lambda x: -float(sum(((x - center) / problem.box.widths) ** 2)), problem.box, 6, **few)
+    maximize(lambda x: -float(sum(((x - center) / problem.box.widths) ** 2)), problem.box, 6, progress=False, **few)

@@ -88,7 +88,7 @@ def grasp(
     input_noise = noise_of(noise or "none", method)
 
     from surehold.cli.compilation import announced
-    from surehold.cli.session import Kept, folder_for, run_session
+    from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
     from surehold.grasping.pictures.scene import grasp_scene
@@ -139,7 +139,10 @@ def grasp(
         if report.recommended.scene is not None:
             write_file(folder / "grasp.png", still_picture(report.recommended.scene)[0])
 
-    run_session(
+    def statuses(result: Any) -> Counter[str]:
+        return Counter(outcomes.grasp(x).status for x in result.X)
+
+    report = run_session(
         outcomes,
         title=f"Grasp the {problem.object.name} from the {problem.facet}",
         method=method,
@@ -167,9 +170,14 @@ def grasp(
         units=dict(zip(problem.box.names, problem.units, strict=True)),
         quality_name=f"quality ({problem.simulator.quality})",
         disturbance="the hand is off",
+        success_above=0.0,
+        outcomes=statuses,
+        advice="Try another --facet, more --variables (dz, rx, ry, rz or s1), another --preshape, or more --trials.",
         kept=kept,
         console=console,
     )
+    if not report.succeeded:
+        raise typer.Exit(NO_SUCCESS)
 
 
 def neighbors_of(problem: Any, candidate: Any) -> Any:

@@ -1,31 +1,50 @@
-"""Ctrl-C while files are written: it waits, so that what was found is on disk before the program ends."""
+"""Ctrl-C and SIGTERM: a run keeps what was done; while its files are written both wait."""
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 from rich.console import Console
 
-__all__ = ["undisturbed"]
+__all__ = ["terminable", "undisturbed"]
+
+#: What ends a program from outside: `kill` and job schedulers, and a terminal that is closed.
+_ENDING: Final = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Let SIGTERM, and SIGHUP unless it is ignored (nohup), do in the block what Ctrl-C does."""
+
+    def end(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    with _handling([s for s in _ENDING if signal.getsignal(s) != signal.SIG_IGN], end):
+        yield
 
 
 @contextmanager
 def undisturbed(console: Console) -> Iterator[None]:
-    """Let Ctrl-C wait until the block has ended; it then does nothing more, as the work is done.
-
-    Signals reach the main thread alone: elsewhere the block runs as it is.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+    """Let Ctrl-C and SIGTERM wait until the block has ended; they then do nothing more, as the work is done."""
 
     def wait(*_: Any) -> None:
         console.print("Writing what was found; this takes a moment.")
 
-    before = signal.signal(signal.SIGINT, wait)
+    with _handling([signal.SIGINT, *_ENDING], wait):
+        yield
+
+
+@contextmanager
+def _handling(signals: list[signal.Signals], handler: Callable[..., Any]) -> Iterator[None]:
+    """Signals reach the main thread alone: elsewhere the block runs as it is."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, handler) for number in signals}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)

@@ -60,6 +60,9 @@ def maximize(
     out: Out = "",
     study: Study = "",
     storage: StudyStorage = "",
+    tolerate_failures: Annotated[
+        bool, typer.Option("--tolerate-failures", help="Go on although the first three trials all failed.")
+    ] = False,
     open_report: Open = False,
 ) -> None:
     """Find a maximum that still holds when the input is off."""
@@ -89,6 +92,7 @@ def maximize(
         folder=folder_for(chosen.name, method, seed, out, study),
         open_report=open_report,
         settings={"problem": problem, "bounds": bounds or None, "input noise": noise_text},
+        tolerate_failures=tolerate_failures,
         kept=kept,
     )
 

@@ -31,7 +31,10 @@ METHODS = {
 Method = Annotated[str, typer.Option(help="ubo: knows the input noise; bo: plain Bayesian optimization.")]
 Seed = Annotated[int, typer.Option(help="Same seed, same run.")]
 Out = Annotated[
-    str, typer.Option(help="Folder for the results; by default runs/NAME-METHOD-seedN.", show_default=False)
+    str,
+    typer.Option(
+        help="Folder for the results, written over; by default a new one, runs/NAME-METHOD-seedN.", show_default=False
+    ),
 ]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser at the end.")]
 Preset = Annotated[str, typer.Option(help="Settings by name, such as thesis.", show_default=False)]

@@ -5,7 +5,7 @@ import re
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from surehold.cli.compilation import announced, warm_up
-from surehold.cli.interruption import undisturbed
+from surehold.cli.interruption import terminable, undisturbed
 from surehold.cli.terminal import terminal
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.maximization import Result, Trial, maximize
@@ -26,11 +26,14 @@ from surehold.problems.problem import Problem
 from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.verdict import number, verdict
-from surehold.store.atomic import checked_folder
+from surehold.store.atomic import checked_folder, new_folder
 
-__all__ = ["Kept", "folder_for", "run_session"]
+__all__ = ["NO_SUCCESS", "Kept", "folder_for", "run_session"]
+
+NO_SUCCESS = 3  # exit code of a run whose trials all gave a value, none of which is a success
 
 REQUERIES = 100  # perturbed re-queries of a candidate; they score and are no part of the budget
+_MOST_TRIALS = 100_000  # a model of more is out of reach
 
 
 @dataclass(frozen=True)
@@ -49,13 +52,18 @@ class Kept:
 
 
 def folder_for(name: str, method: str, seed: int, out: str, study: str = "") -> Path:
-    """Return the folder for a run's files, created and writable: `out`, runs/STUDY, or runs/NAME-METHOD-seedN."""
+    """Return the folder for a run's files, created and writable: `out`, runs/STUDY, or a new one in runs/.
+
+    A new one is called NAME-METHOD-seedN, with -2, -3, ... behind it where that is taken: no run replaces another.
+    """
     if study and not out:
         from surehold.studies.storage import checked_name
 
         return checked_folder(Path("runs") / checked_name(study))
-    slug = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "run"
-    return checked_folder(out or Path("runs") / f"{slug}-{method}-seed{seed}")
+    if out:
+        return checked_folder(out)
+    slug = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower()[:100] or "run"
+    return new_folder(Path("runs") / f"{slug}-{method}-seed{seed}")
 
 
 def run_session(
@@ -76,14 +84,20 @@ def run_session(
     units: Mapping[str, str] | None = None,
     quality_name: str = "value",
     disturbance: str = "the input is off",
+    tolerate_failures: bool = False,
+    success_above: float | None = None,
+    outcomes: Callable[[Result], Mapping[str, int]] = lambda result: {},
+    advice: str = "",
     kept: Kept | None = None,
     console: Console | None = None,
 ) -> RunReport:
-    """Maximize, score, write and show; Ctrl-C keeps what was done.
+    """Maximize, score, write and show; Ctrl-C and SIGTERM keep what was done.
 
     A run that is kept as a study is resumed where that exists.
 
-    `describe` adds to a candidate what the problem knows of it; `also_write` writes further files.
+    `describe` adds to a candidate what the problem knows of it; `also_write` writes further files. Where no trial is
+    worth more than `success_above`, the report says so first, with the counts of `outcomes` and `advice`; what the
+    caller returns then is `NO_SUCCESS` as exit code.
 
     Raises
     ------
@@ -95,76 +109,103 @@ def run_session(
         If Ctrl-C comes before any trial has given a value.
     """
     console = console or terminal()
-    for name, count in (("trials", trials), ("initial", initial)):
-        if count < 1:
-            raise InputError(f"--{name} is {count}; give 1 or more.")
-    if initial > trials:
-        raise InputError(
-            f"--initial is {initial}, but --trials is {trials}; give at least as many trials as initial ones."
-        )
-    options: dict[str, Any] = {
-        "input_noise": noise if method == "ubo" else None,
-        "n_initial": initial,
-        "seed": seed,
-        "preset": preset or None,
-    }
-    if noise is not None:
-        noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
-    console.print(f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), method {method}, seed {seed}")
     started = time.perf_counter()
-    with announced(console):
-        warm_up(problem, options)
-    if kept is None or not kept.study:
-        result = _with_progress(problem, trials, options, console)
-    else:
-        result = _as_study(kept, problem, trials, options, units or {}, console)
-    if result.interrupted:
-        console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
-    notes = _failures(result)
-    scores: dict[tuple[str, int], RobustScore | None] = {}
-    for label, index in gather.answers(result).items():
-        scores[label, index] = None
+    with terminable(), _new_folder_removed_on_error(folder):
+        for name, count in (("trials", trials), ("initial", initial)):
+            if count < 1:
+                raise InputError(f"--{name} is {count}; give 1 or more.")
+            if count > _MOST_TRIALS:
+                raise InputError(f"--{name} is {count}; give {_MOST_TRIALS:,} at most.")
+        if initial > trials:
+            raise InputError(
+                f"--initial is {initial}, but --trials is {trials}; give at least as many trials as initial ones."
+            )
+        options: dict[str, Any] = {
+            "input_noise": noise if method == "ubo" else None,
+            "n_initial": initial,
+            "seed": seed,
+            "preset": preset or None,
+        }
         if noise is not None:
-            try:
-                scores[label, index] = robust_score(problem, result.X[index], noise, n=REQUERIES, seed=seed)
-            except KeyboardInterrupt:
-                notes = [*notes, f"The re-queries of the {label} point were interrupted and left out."]
-    with undisturbed(console):
-        report = gather.report_of(
-            result,
-            [describe(gather.candidate(result, label, i, score)) for (label, i), score in scores.items()],
-            title=title,
-            settings={
-                **settings,
-                "method": method,
-                "trials": trials,
-                "initial trials": initial,
-                "preset": preset or None,
-                "study": kept.study if kept and kept.study else None,
-            },
-            noise=noise,
-            units=units,
-            quality_name=quality_name,
-            disturbance=disturbance,
-            planned_trials=trials,
-            notes=notes,
+            noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
+        console.print(
+            f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), method {method}, seed {seed}"
         )
-        path = files.write_run(report, folder)
-        also_write(report, folder)
+        with announced(console):
+            warm_up(problem, options)
+        if kept is None or not kept.study:
+            try:
+                result = _with_progress(problem, trials, options, tolerate_failures, console)
+            except SureholdError as error:  # which names the option as Python spells it
+                raise type(error)(
+                    str(error).replace("say tolerate_failures=True", "give --tolerate-failures")
+                ) from None
+        else:
+            result = _as_study(kept, problem, trials, options, units or {}, console)
+        if result.interrupted:
+            console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
+        notes = _failures(result)
+        scores: dict[tuple[str, int], RobustScore | None] = {}
+        for label, index in gather.answers(result).items():
+            scores[label, index] = None
+            if noise is not None:
+                try:
+                    scores[label, index] = robust_score(problem, result.X[index], noise, n=REQUERIES, seed=seed)
+                except KeyboardInterrupt:
+                    notes = [*notes, f"The re-queries of the {label} point were interrupted and left out."]
+        with undisturbed(console):
+            report = gather.report_of(
+                result,
+                [describe(gather.candidate(result, label, i, score)) for (label, i), score in scores.items()],
+                title=title,
+                settings={
+                    **settings,
+                    "method": method,
+                    "trials": trials,
+                    "initial trials": initial,
+                    "preset": preset or None,
+                    "study": kept.study if kept and kept.study else None,
+                },
+                noise=noise,
+                units=units,
+                quality_name=quality_name,
+                disturbance=disturbance,
+                planned_trials=trials,
+                notes=notes,
+                success_above=success_above,
+                outcomes={} if _any_above(result, success_above) else outcomes(result),
+                advice=advice,
+            )
+            path = files.write_run(report, folder)
+            also_write(report, folder)
     _show(report, path, time.perf_counter() - started, console)
     if open_report:
         webbrowser.open(path.resolve().as_uri())
     return report
 
 
-def _with_progress(problem: Problem, trials: int, options: dict[str, Any], console: Console) -> Result:
+@contextmanager
+def _new_folder_removed_on_error(folder: Path) -> Iterator[None]:
+    """Remove the run's folder in runs/ where the block fails before anything was written into it."""
+    try:
+        yield
+    except BaseException:
+        if folder.parent == Path("runs"):
+            with suppress(OSError):  # it is not empty
+                folder.rmdir()
+        raise
+
+
+def _with_progress(
+    problem: Problem, trials: int, options: dict[str, Any], tolerate_failures: bool, console: Console
+) -> Result:
     with _progress(trials, options, console) as show:
 
         def told(trial: Trial) -> None:
             robust = None if trial.recommendation is None else trial.recommendation.mean
             show(trial.index + 1, trial.best, robust)
 
-        return maximize(problem, problem.box, trials, callback=told, **options)
+        return maximize(problem, problem.box, trials, callback=told, tolerate_failures=tolerate_failures, **options)
 
 
 def _as_study(
@@ -259,15 +300,23 @@ def _show(report: RunReport, path: Path, seconds: float, console: Console) -> No
         table.add_column("highest observed = recommended" if alone else candidate.label, overflow="fold")
     for name, cells in page.table_rows(report):
         table.add_row(_plain(name), *(_plain(cell) for cell in cells))
+    told = verdict(report)
+    if not report.succeeded:
+        console.print(f"\n[bold]{_plain(told.headline)}[/bold] {_plain(told.text)}")
     console.print()
     console.print(table)
     console.print()
-    console.print(_plain(verdict(report).headline))
+    if report.succeeded:
+        console.print(_plain(told.headline))
     for note in report.notes:
         console.print(f"Note: {_plain(note)}")
     failed = int(np.sum(report.failed))
     rest = f", {failed} failed" if failed else ""
     console.print(f"{report.y.size} trials{rest} in {seconds:.1f} s. Report: {_plain(str(path))}", soft_wrap=True)
+
+
+def _any_above(result: Result, limit: float | None) -> bool:
+    return limit is None or bool(np.nanmax(result.y) > limit)
 
 
 def _plain(text: str) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from surehold.cli import study_people, study_service
-from surehold.cli.study_options import Json, Name, Storage, opened, quiet, say
+from surehold.cli.study_options import Json, Name, Storage, opened, quiet, say, write_out
 
 __all__ = ["studies"]
 
@@ -42,7 +42,7 @@ def create(
     parameters: Annotated[
         str,
         typer.Option(
-            help="dx=-0.05:0.05,force=0.1:100:log,fingers=2:5:int,turn=0:1:step=0.25,grip=pinch|power",
+            help="dx=-0.05:0.05,force=0.1:100:log,fingers=2:5:int,turn=0:1:step=0.25,grip=pinch/power",
             show_default=False,
         ),
     ] = "",
@@ -188,7 +188,7 @@ def export(
     if out:
         write_file(Path(out), text)
     else:
-        typer.echo(text, nl=False)
+        write_out(text)
 
 
 def _space_of(parameters: str, problem: str) -> tuple[Any, dict[str, Any]]:

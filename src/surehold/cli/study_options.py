@@ -1,6 +1,9 @@
 """What the commands of `surehold study` share."""
 
 import json
+import os
+import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -8,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from surehold.studies.robot import RobotStudy
 
-__all__ = ["Json", "Name", "Storage", "opened", "quiet", "say"]
+__all__ = ["Json", "Name", "Storage", "opened", "quiet", "say", "write_out"]
 
 Name = Annotated[str, typer.Argument(help="Name of the study.")]
 Storage = Annotated[
@@ -38,5 +41,29 @@ def quiet() -> None:
 
 
 def say(found: dict[str, Any], text: str, as_json: bool) -> None:
-    """Print what was found as JSON or as text."""
-    typer.echo(json.dumps(found, allow_nan=False) if as_json else text)
+    """Print what was found as JSON or as text.
+
+    Raises
+    ------
+    SureholdError
+        If it cannot be written; what was stored before stays stored.
+    """
+    write_out((json.dumps(found, allow_nan=False) if as_json else text) + "\n")
+
+
+def write_out(text: str) -> None:
+    """Write text to the standard output, whole; raises SureholdError where that cannot be."""
+    from surehold.cli.terminal import speak_plainly
+    from surehold.errors import SureholdError
+
+    speak_plainly()
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except OSError as error:
+        with suppress(OSError):  # or Python complains when it flushes at exit
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SureholdError(
+            f"the answer cannot be written ({error.strerror or error}); what was stored before is kept, see: surehold "
+            "study status."
+        ) from None

@@ -1,6 +1,6 @@
 """What runs beside a study: workers, the HTTP service, the dashboard, the report."""
 
-import signal
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -31,6 +31,7 @@ def work(
 ) -> None:
     """Make trials until the study stops (see `study stop`); start as many workers as wanted."""
     from surehold.cli.compilation import announced
+    from surehold.cli.interruption import terminable
     from surehold.cli.terminal import terminal
     from surehold.studies.trial_function import problem_of, trial_function
     from surehold.studies.worker import work as work_on
@@ -38,11 +39,7 @@ def work(
     study = opened(name, storage)
     console = terminal()
 
-    def ended(*_: Any) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, ended)
-    with announced(console):
+    with terminable(), announced(console):
         attempt = trial_function(problem_of(study.settings, function), study.settings.space)
         count = 0
 
@@ -61,13 +58,20 @@ def work(
 
 
 def serve(
+    context: typer.Context,
     name: Name,
     port: Annotated[int, typer.Option(help="On the loopback interface; 0 takes a free one.", min=0, max=65535)] = 8765,
     token: Annotated[
         str,
         typer.Option(
-            envvar="SUREHOLD_TOKEN", help="What callers must send; by default a new one is made.", show_default=False
+            envvar="SUREHOLD_TOKEN",
+            help="What callers must send; by default a new one is made. Give it by the environment or by --token-file: "
+            "a command line is seen by all users of a machine.",
+            show_default=False,
         ),
+    ] = "",
+    token_file: Annotated[
+        str, typer.Option(help="File that holds the token, readable by its owner only (mode 600).", show_default=False)
     ] = "",
     storage: Storage = "",
 ) -> None:
@@ -75,6 +79,14 @@ def serve(
     from surehold.studies.service import listening, new_token, service
 
     study = opened(name, storage)
+    if token_file:
+        token = token_of(token_file)
+    elif token and getattr(context.get_parameter_source("token"), "name", "") == "COMMANDLINE":
+        typer.echo(
+            "warning: all users of this machine see the token on the command line; give it in SUREHOLD_TOKEN or a file "
+            "(--token-file).",
+            err=True,
+        )
     secret = token or new_token()
     with listening(port) as server:
         application = service(study, secret)
@@ -82,6 +94,31 @@ def serve(
         if not token:
             typer.echo(f"Callers send the header: Authorization: Bearer {secret}")
         server.run(application)
+
+
+def token_of(path: str) -> str:
+    """Return the token in a file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or others than its owner can read it.
+    """
+    from surehold.errors import InputError
+
+    try:
+        with open(path, encoding="utf-8") as file:
+            mode = os.fstat(file.fileno()).st_mode
+            text = file.read(10_000).strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"token file {path!r} cannot be read: {getattr(error, 'strerror', None) or error}.") from None
+    if os.name == "posix" and mode & 0o077:
+        raise InputError(
+            f"token file {path!r} can be read by other users (mode {mode & 0o777:o}); close it with: chmod 600."
+        )
+    if not text:
+        raise InputError(f"token file {path!r} is empty; write 16 characters or more into it.")
+    return text
 
 
 def dashboard(

@@ -1,12 +1,13 @@
 """The search space: named bounds in the user's units, and the map to the unit cube in which the optimizer works."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.optimization.points import points_of
 
 __all__ = ["Box"]
 
@@ -77,40 +78,40 @@ class Box:
         """`upper - lower`, shape (d,)."""
         return self.upper - self.lower
 
-    def to_unit(self, x: ArrayLike) -> NDArray[np.float64]:
-        """Map points (..., d) from the user's units to the unit cube."""
-        return (self._points(x) - self.lower) / self.widths
+    def to_unit(self, x: Any) -> NDArray[np.float64]:
+        """Map points (..., d), however they are handed over, from the user's units to the unit cube."""
+        return (self.points(x) - self.lower) / self.widths
 
-    def from_unit(self, u: ArrayLike) -> NDArray[np.float64]:
+    def from_unit(self, u: Any) -> NDArray[np.float64]:
         """Map points (..., d) of the unit cube to the user's units; cube points never leave the box by rounding."""
-        u = self._points(u)
+        u = self.points(u)
         x = self.lower + u * self.widths
         inside = (u >= 0.0) & (u <= 1.0)
         return np.where(inside, np.clip(x, self.lower, self.upper), x)
 
-    def contains(self, x: ArrayLike, tolerance: float = 1e-9) -> bool:
+    def contains(self, x: Any, tolerance: float = 1e-9) -> bool:
         """Tell whether every point of x (..., d) lies in the box, up to `tolerance` box widths of rounding."""
         slack = tolerance * self.widths
-        x = self._points(x)
+        x = self.points(x)
         return bool(np.all((x >= self.lower - slack) & (x <= self.upper + slack)))
 
-    def as_dict(self, x: ArrayLike) -> dict[str, float]:
-        """Return one point (d,) as `{name: value}`."""
-        return dict(zip(self.names, self._points(x).tolist(), strict=True))
+    @property
+    def rounding(self) -> NDArray[np.float64]:
+        """By how much a coordinate may lie beyond a bound and still count as the bound, (d,), in the user's units.
 
-    def _points(self, x: ArrayLike) -> NDArray[np.float64]:
-        try:
-            points = np.asarray(x, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(
-                f"point {x!r} is not numeric; give {self.dimension} numbers ({', '.join(self.names)})."
-            ) from None
-        if points.ndim == 0 or points.shape[-1] != self.dimension:
-            raise InputError(
-                f"point of shape {points.shape} does not fit; the last axis must have {self.dimension} "
-                f"entries ({', '.join(self.names)})."
-            )
-        return points
+        1e-9 box widths, and the rounding of single precision (2^-23 of the larger bound, at most 1e-3 box widths): a
+        bound that went through a 32-bit float is the bound.
+        """
+        single = 2.0**-23 * np.maximum(np.abs(self.lower), np.abs(self.upper))
+        return 1e-9 * self.widths + np.minimum(single, 1e-3 * self.widths)
+
+    def as_dict(self, x: Any) -> dict[str, float]:
+        """Return one point (d,) as `{name: value}`."""
+        return dict(zip(self.names, self.points(x).tolist(), strict=True))
+
+    def points(self, x: Any) -> NDArray[np.float64]:
+        """Return points (..., d) in the user's units, however they are handed over; see `points_of`."""
+        return points_of(x, self.names)
 
     def __eq__(self, other: object) -> bool:
         return (

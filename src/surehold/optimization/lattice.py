@@ -5,16 +5,18 @@ trial (Garrido-Merchan and Hernandez-Lobato 2020, Neurocomputing 380, 20-35). Pe
 have been perturbed.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.errors import InputError, unknown_name
+from surehold.optimization.box import Box
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
 
-__all__ = ["Lattice", "LatticePosterior"]
+__all__ = ["Lattice", "LatticePosterior", "with_fixed"]
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,34 @@ class Lattice:
     """maps points (..., d) to the nearest ones that can be tried; those stay where they are"""
     smooth: NDArray[np.bool_]
     """whether a coordinate can be tried everywhere, (d,)"""
+
+
+def with_fixed(lattice: Lattice | None, box: Box, fixed: Mapping[str, float] | None) -> Lattice | None:
+    """Return the points of a lattice (None: all of the box) at which variables have fixed values {name: value}.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a value is no number inside of the box, or no variable is left.
+    """
+    if not fixed:
+        return lattice
+    x = box.from_unit(np.full(box.dimension, 0.5))
+    for name, value in fixed.items():
+        if name not in box.names:
+            raise unknown_name("fixed variable", name, box.names)
+        x[box.names.index(name)] = box.points({**box.as_dict(x), name: value})[box.names.index(name)]
+    if not box.contains(x):
+        raise InputError(f"fixed is {dict(fixed)!r}, which is not inside {box}.")
+    held = np.array([name in fixed for name in box.names])
+    if held.all():
+        raise InputError("every variable is fixed; there is nothing to optimize.")
+    values = np.clip(box.to_unit(x), 0.0, 1.0)
+
+    def snap(U: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(held, values, U if lattice is None else lattice.snap(U))
+
+    return Lattice(snap, ~held if lattice is None else lattice.smooth & ~held)
 
 
 class LatticePosterior:

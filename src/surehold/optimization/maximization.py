@@ -1,51 +1,86 @@
 """A whole run: ask, try, tell, until the budget is spent."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
+from surehold.optimization.evaluation import Evaluation, in_processes, one_by_one
 from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.progress import progress_bar
 from surehold.optimization.recommendation import Recommendation
 
-__all__ = ["Result", "Trial", "evaluate", "maximize"]
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+__all__ = ["Result", "Trial", "maximize", "minimize"]
+
+_PATIENCE: Final = 3  # failures after which a run is given up where nothing has succeeded yet
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One finished trial, as passed to the callback."""
+    """One finished trial, as passed to the callback.
+
+    Attributes
+    ----------
+    index
+        0 for the first that finished.
+    x : (d,)
+        In the box's units.
+    y
+        Value; NaN where the trial failed.
+    failure
+        Why it failed, empty where it did not.
+    best
+        Best value so far, NaN while there is none.
+    recommendation
+        What would be recommended now; None during the initial design.
+    seconds
+        Time that asking took.
+    """
 
     index: int
-    """0 for the first"""
     x: NDArray[np.float64]
-    """(d,), in the box's units"""
     y: float
-    """NaN where the trial failed"""
     failure: str
-    """why it failed, empty where it did not"""
     best: float
-    """highest value so far, NaN while there is none"""
     recommendation: Recommendation | None
-    """what would be recommended now; None during the initial design"""
     seconds: float
-    """time that asking took"""
+
+    def __repr__(self) -> str:
+        what = self.failure or f"y={self.y:.6g}"
+        return f"Trial(index={self.index}, x={np.array2string(self.x, precision=6, separator=', ')}, {what})"
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a run has found."""
+    """What a run has found.
+
+    Attributes
+    ----------
+    optimizer
+        Holds all trials and the model; can be asked further.
+    trials
+        In the order in which they finished.
+    recommendation
+        The answer.
+    interrupted
+        Whether Ctrl-C ended the run before its budget.
+    stopped
+        What ended the run before its budget: "Ctrl-C", "callback" or "timeout"; empty where nothing did.
+    """
 
     optimizer: Optimizer
-    """holds all trials and the model; can be asked further"""
     trials: tuple[Trial, ...]
     recommendation: Recommendation
     interrupted: bool
-    """whether Ctrl-C ended the run before its budget"""
+    stopped: str = ""
 
     @property
     def X(self) -> NDArray[np.float64]:
@@ -59,8 +94,47 @@ class Result:
 
     @property
     def best_index(self) -> int:
-        """Index of the trial with the highest value."""
-        return int(np.nanargmax(self.y))
+        """Index of the trial with the best value."""
+        return int(np.nanargmin(self.y) if self.optimizer.direction == "minimize" else np.nanargmax(self.y))
+
+    def to_dataframe(self) -> "DataFrame":
+        """Return the trials as a table of pandas: one column a variable, then value, failure, best and seconds.
+
+        The index is `Trial.index`. Raises SureholdError where pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise SureholdError("to_dataframe needs pandas; install it: pip install pandas.") from None
+        table = pandas.DataFrame(
+            np.array([trial.x for trial in self.trials]).reshape(-1, self.optimizer.box.dimension),
+            columns=list(self.optimizer.box.names),
+        )
+        for name, column in (("value", "y"), ("failure", "failure"), ("best", "best"), ("seconds", "seconds")):
+            values = [getattr(trial, column) for trial in self.trials]
+            table[name if name not in table else f"trial {name}"] = values
+        table.index.name = "trial"
+        return table
+
+    def __repr__(self) -> str:
+        failed = int(np.isnan(self.y).sum())
+        parts = (
+            [f"{len(self.y)} trials"]
+            + [f"{failed} failed"] * bool(failed)
+            + [f"stopped by {self.stopped}"] * bool(self.stopped)
+        )
+        return f"<Result of {', '.join(parts)}; {self.recommendation!r}>"
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        rows = [*zip(self.optimizer.box.names, [f"{v:.6g}" for v in self.recommendation.x], strict=True)]
+        rows += [
+            (name, f"{getattr(self.recommendation, name):.6g}") for name in ("mean", "std", "quantile", "observed")
+        ]
+        cells = "".join(f"<tr><th>{escape(name)}</th><td>{value}</td></tr>" for name, value in rows)
+        refused = f"<p>{escape(self.recommendation.refused)}</p>" if self.recommendation.refused else ""
+        return f"<table><caption>Recommended after {len(self.y)} trials</caption>{cells}</table>{refused}"
 
 
 def maximize(
@@ -69,6 +143,10 @@ def maximize(
     n_trials: int = 100,
     *,
     callback: Callable[[Trial], Any] | None = None,
+    timeout: float | None = None,
+    n_jobs: int = 1,
+    tolerate_failures: bool = False,
+    progress: bool | None = None,
     **settings: Any,
 ) -> Result:
     """Maximize f over the box in `n_trials` trials, so that the answer holds under the input noise.
@@ -81,18 +159,30 @@ def maximize(
     n_trials
         Budget, initial design included.
     callback
-        Called with each finished trial.
+        Called with each finished trial. Where it returns True, or raises StopIteration, the run ends and its result is
+        returned.
+    timeout
+        Seconds after which no further trial is begun; None: no limit.
+    n_jobs
+        Trials made at the same time, each in a process of its own; 1 makes them in this one. A new trial is asked for
+        as soon as one has finished, so that what is asked depends on how long trials take.
+    tolerate_failures
+        Whether to go on where the first three trials fail, for functions that fail almost everywhere. By default such
+        a run is given up: mostly it is the function that is wrong, and no trial would succeed.
+    progress
+        Whether a progress bar is shown once a run takes more than two seconds; by default where there is no callback
+        and the output is a terminal.
     **settings
-        Of `Optimizer`: input_noise, surrogate, criterion, n_initial, seed, noise, preset, ...
+        Of `Optimizer`: input_noise, surrogate, criterion, n_initial, initial_points, fixed, seed, noise, preset, ...
 
     Ctrl-C ends the run and keeps what was done.
 
     Raises
     ------
     InputError
-        For bad settings, or more initial trials than trials.
+        For bad settings, more initial trials than trials, or a function that cannot be called with one array.
     SureholdError
-        If every trial failed; the message quotes the last failure.
+        If every trial failed, or the first three did; the message quotes the last failure.
     KeyboardInterrupt
         If Ctrl-C comes before any trial has given a value.
 
@@ -105,58 +195,98 @@ def maximize(
     """
     if not callable(f):
         raise InputError(f"f is {f!r}; give a function that takes x (d,) and returns a number.")
-    if isinstance(n_trials, bool) or not isinstance(n_trials, (int, np.integer)) or n_trials < 1:
-        raise InputError(f"n_trials is {n_trials!r}; give a whole number of 1 or more.")
-    if settings.get("n_initial") is None and isinstance(box, Box):
-        settings["n_initial"] = min(Optimizer.default_n_initial(box), n_trials)
+    n_trials, n_jobs = _count("n_trials", n_trials), _count("n_jobs", n_jobs)
+    if timeout is not None and (isinstance(timeout, bool) or not isinstance(timeout, (int, float)) or not timeout > 0):
+        raise InputError(f"timeout is {timeout!r}; give a number of seconds above 0, or None.")
+    optimizer = _optimizer(box, n_trials, settings)
+    deadline = np.inf if timeout is None else perf_counter() + timeout
+    trials: list[Trial] = []
+    stopped = ""
+    evaluations = one_by_one(optimizer, f, n_trials) if n_jobs == 1 else in_processes(optimizer, f, n_trials, n_jobs)
+    try:
+        with progress_bar(n_trials, callback is None if progress is None else progress) as advance:
+            for evaluation in evaluations:
+                trial = _told(optimizer, evaluation, len(trials))
+                trials.append(trial)
+                if not tolerate_failures and len(trials) == _PATIENCE < n_trials and np.isnan(optimizer.y).all():
+                    raise _given_up(trials)
+                advance(trial.best)
+                if callback is not None and _ends(callback, trial):
+                    stopped = "callback"
+                    break
+                if perf_counter() >= deadline and len(trials) < n_trials:
+                    stopped = "timeout"
+                    break
+    except KeyboardInterrupt:
+        if not np.any(np.isfinite(optimizer.y)):
+            raise
+        stopped = "Ctrl-C"
+    finally:
+        _close(evaluations)
+    if not np.any(np.isfinite(optimizer.y)):
+        raise SureholdError(f"all {len(trials)} trials failed; the last one: {trials[-1].failure}")
+    last = trials[-1].recommendation if trials and len(trials) == len(optimizer.y) else None
+    return Result(optimizer, tuple(trials), last or optimizer.recommend(), stopped == "Ctrl-C", stopped)
+
+
+def minimize(f: Callable[[NDArray[np.float64]], float], box: Box, n_trials: int = 100, **settings: Any) -> Result:
+    """Minimize f over the box; arguments, result and errors as of `maximize`, all values in the sign of f.
+
+    Examples
+    --------
+    >>> result = minimize(lambda x: (x[0] - 0.5) ** 2, Box({"x": (-1.0, 2.0)}), n_trials=12, seed=0)
+    >>> bool(abs(result.recommendation.x[0] - 0.5) < 0.01), bool(result.recommendation.mean < 0.001)
+    (True, True)
+    """
+    return maximize(f, box, n_trials, **(settings | {"direction": "minimize"}))
+
+
+def _count(name: str, value: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise InputError(f"{name} is {value!r}; give a whole number of 1 or more.")
+    return int(value)
+
+
+def _optimizer(box: Box, n_trials: int, settings: dict[str, Any]) -> Optimizer:
     optimizer = Optimizer(box, **settings)
+    if settings.get("n_initial") is None and optimizer.n_initial > n_trials:
+        fewer: dict[str, Any] = {**settings, "n_initial": n_trials}
+        optimizer = Optimizer(box, **fewer)
     if optimizer.n_initial > n_trials:
         raise InputError(
             f"n_initial is {optimizer.n_initial}, but n_trials is {n_trials}; "
             "give at least as many trials as initial ones."
         )
-    trials: list[Trial] = []
-    interrupted = False
-    try:
-        while len(trials) < n_trials:
-            trial = _try_once(optimizer, f, trials)
-            trials.append(trial)
-            if callback is not None:
-                callback(trial)
-    except KeyboardInterrupt:
-        if not np.any(np.isfinite(optimizer.y)):
-            raise
-        interrupted = True
-    if not np.any(np.isfinite(optimizer.y)):
-        raise SureholdError(f"all {len(trials)} trials failed; the last one: {trials[-1].failure}")
-    last = trials[-1].recommendation if trials and len(trials) == len(optimizer.y) else None
-    return Result(optimizer, tuple(trials), last or optimizer.recommend(), interrupted)
+    return optimizer
 
 
-def _try_once(optimizer: Optimizer, f: Callable[[NDArray[np.float64]], float], trials: list[Trial]) -> Trial:
-    started = perf_counter()
-    x = optimizer.ask()
-    seconds = perf_counter() - started
-    y, failure = evaluate(f, x)
-    if failure:
-        optimizer.tell(x, failed=True)
-    else:
-        optimizer.tell(x, y)
+def _told(optimizer: Optimizer, evaluation: Evaluation, index: int) -> Trial:
+    asked, y, failure, seconds = evaluation
+    optimizer.tell(asked, None if failure else y, failed=bool(failure))
     values = optimizer.y
-    best = float(np.nanmax(values)) if np.any(np.isfinite(values)) else np.nan
+    best = np.nan
+    if np.any(np.isfinite(values)):
+        best = float(np.nanmin(values) if optimizer.direction == "minimize" else np.nanmax(values))
     modelled = len(values) >= optimizer.n_initial and np.isfinite(best)
-    recommendation = optimizer.recommend() if modelled else None
-    return Trial(len(trials), x, y, failure, best, recommendation, seconds)
+    return Trial(index, asked.x, y, failure, best, optimizer.recommend() if modelled else None, seconds)
 
 
-def evaluate(f: Callable[[NDArray[np.float64]], float], x: NDArray[np.float64]) -> tuple[float, str]:
-    """Return f(x) and an empty text, or NaN and why there is no finite number."""
+def _ends(callback: Callable[[Trial], Any], trial: Trial) -> bool:
     try:
-        value = np.asarray(f(x.copy()), dtype=np.float64)
-    except Exception as error:  # whatever a user's function raises is the trial's outcome, not the run's end
-        return np.nan, f"{type(error).__name__}: {error}"
-    if value.size != 1:
-        return np.nan, f"returned an array of shape {value.shape} instead of one number"
-    if not np.isfinite(value).all():
-        return np.nan, f"returned {float(value.reshape(()))}"
-    return float(value.reshape(())), ""
+        return callback(trial) is True
+    except StopIteration:
+        return True
+
+
+def _close(evaluations: Iterator[Evaluation]) -> None:
+    close = getattr(evaluations, "close", None)
+    if close is not None:
+        close()
+
+
+def _given_up(trials: list[Trial]) -> SureholdError:
+    last = trials[-1]
+    return SureholdError(
+        f"the first {len(trials)} trials failed, so the run is given up; the last one, at x = {last.x.tolist()}: "
+        f"{last.failure}. Mend the function, or, if it fails almost everywhere, say tolerate_failures=True."
+    )

@@ -5,18 +5,21 @@ Legend
     t   trials told, failed ones included
 """
 
-from typing import Final, Literal
+import os
+from collections.abc import Mapping
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.defaults import DESIGN_LEAST, DESIGN_PER_VARIABLE, KAPPA, OUTCOME_EXPONENT
 from surehold.errors import InputError, unknown_name
+from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
-from surehold.optimization.lattice import Lattice, LatticePosterior
+from surehold.optimization.lattice import Lattice, LatticePosterior, with_fixed
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.numerics.threads import single_threaded
@@ -31,13 +34,13 @@ from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.surrogates.named import refuse_settings, surrogate_named
 from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate, mixture
-from surehold.optimization.trials import Trials, same
+from surehold.optimization.trials import AskedTrial, Trials, initial_inputs, number_of, same
 
 __all__ = ["Optimizer"]
 
 
 class Optimizer:
-    """Bayesian optimization by ask and tell; everything is maximized.
+    """Bayesian optimization by ask and tell.
 
     What `ask` returns depends on the settings, the trials told, the pending trials and the seed alone: an optimizer
     rebuilt from stored trials asks the same next point. (The thesis presets continue their chains and do not.)
@@ -46,6 +49,9 @@ class Optimizer:
     ----------
     box
         The search space.
+    direction
+        "maximize" (default) or "minimize". Whatever is told and answered is in the user's own sign; the model, the
+        criteria and `posterior` are of the negated values where the optimizer minimizes.
     input_noise
         How far the reached input strays from the commanded one; None for inputs that are reached exactly.
     surrogate
@@ -60,7 +66,12 @@ class Optimizer:
         maximum of a function, or of its outcome, drawn from the posterior). By default "log_ei" without and
         "robust_log_ei" with input noise; in the thesis presets "ei" and "uei".
     n_initial
-        Trials of the initial design; by default 5 for each variable, at least 6.
+        Trials of the initial design; by default 5 for each variable that is not fixed, at least 6.
+    initial_points
+        Points to be tried first, (i, d) or a list of whatever `tell` takes as x; they count as trials of the initial
+        design, whose rest follows.
+    fixed
+        {name: value} of variables that keep this value in every trial.
     design
         "latin_hypercube" (default), "sobol" or "uniform".
     seed
@@ -114,10 +125,13 @@ class Optimizer:
         self,
         box: Box,
         *,
+        direction: str = "maximize",
         input_noise: InputNoise | None = None,
         surrogate: str | Surrogate = "gp",
         criterion: str | None = None,
         n_initial: int | None = None,
+        initial_points: Any = None,
+        fixed: Mapping[str, float] | None = None,
         design: str = "latin_hypercube",
         seed: int = 0,
         noise: float | NoiseName | None = None,
@@ -132,12 +146,23 @@ class Optimizer:
         preset: str | None = None,
         lattice: Lattice | None = None,
     ):
+        given = {name: value for name, value in locals().items() if name not in ("self", "box")}
         if not isinstance(box, Box):
             raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
+        if direction not in ("maximize", "minimize"):
+            raise unknown_name("direction", direction, ("maximize", "minimize"))
         self.box: Final = box
-        self.input_noise: Final = input_noise
+        self.direction: Final = direction
+        self._sign: Final = 1.0 if direction == "maximize" else -1.0
+        self.input_noise: Final = checked_input_noise(input_noise, box.names)
         self.seed: Final = _count("seed", seed, 0)
-        self.n_initial: Final = _count("n_initial", self.default_n_initial(box) if n_initial is None else n_initial, 1)
+        variables = box.dimension - len(fixed or ())
+        first = initial_inputs(box, initial_points)
+        self._settings = given | {"initial_points": None if initial_points is None else box.from_unit(first).tolist()}
+        wanted = self.default_n_initial(box, variables) if n_initial is None else n_initial
+        self.n_initial: Final = max(_count("n_initial", wanted, 1), len(first))
+        if output_range is not None and direction == "minimize":
+            output_range = (-output_range[1], -output_range[0])
         thesis = None if preset is None else thesis_preset(preset)
         deviations = np.zeros(box.dimension)
         if input_noise is not None:
@@ -174,16 +199,20 @@ class Optimizer:
                 "'tgp', or an object with known_noise), without a thesis preset."
             )
         self._straying = noise_while_exploring
-        self._lattice = lattice
+        self._lattice = with_fixed(lattice, box, fixed)
         rng = np.random.default_rng([self.seed, 0])
-        self._design = initial_design(design, self.n_initial, box.dimension, rng)
+        rest = initial_design(design, max(self.n_initial - len(first), 1), box.dimension, rng)
+        self._design = np.concatenate([first, rest])
         self._trials = Trials(box)
         self._cache: tuple[int, Posterior] | None = None
 
     @staticmethod
-    def default_n_initial(box: Box) -> int:
-        """Return the size of the initial design where none is given: 5 for each variable, at least 6."""
-        return max(DESIGN_LEAST, DESIGN_PER_VARIABLE * box.dimension)
+    def default_n_initial(box: Box, variables: int | None = None) -> int:
+        """Return the size of the initial design where none is given: 5 for each variable, at least 6.
+
+        `variables` are those that can vary, where the box has others, or several coordinates for one (a choice).
+        """
+        return max(DESIGN_LEAST, DESIGN_PER_VARIABLE * (box.dimension if variables is None else variables))
 
     # --- trials -------------------------------------------------------------------------------------------------
 
@@ -195,52 +224,129 @@ class Optimizer:
     @property
     def y(self) -> NDArray[np.float64]:
         """Values told so far, (t,); NaN for failed trials."""
-        return self._trials.values
+        return self._sign * self._trials.values
 
     @property
     def pending(self) -> NDArray[np.float64]:
         """Inputs asked for and not told yet, (p, d), in the box's units."""
         return self.box.from_unit(self._trials.pending)
 
-    def tell(
-        self, x: ArrayLike, y: float | None = None, *, failed: bool = False, reached: ArrayLike | None = None
-    ) -> None:
-        """Record the outcome y of a trial at x (d,), or that it gave nothing.
+    @property
+    def reached(self) -> NDArray[np.float64]:
+        """Inputs truly reached (t, d), in the box's units: the commanded ones where nothing else was told."""
+        return self.box.from_unit(self._trials.reached)
 
-        A failed trial counts for the model as the lowest value told so far, so that it is avoided. If x is pending it
-        is so no more; a trial that was never asked for is welcome too. Where the input that was truly reached (d,) is
-        known, the model learns from that one.
+    def tell(
+        self,
+        x: Any,
+        y: float | None = None,
+        *,
+        failed: bool | Literal["rig"] = False,
+        reached: Any = None,
+    ) -> None:
+        """Record the outcome y of a trial at x, or that it gave nothing.
+
+        Parameters
+        ----------
+        x
+            Where: an `AskedTrial`, or the point (d,) in the box's units; a dictionary or a Series of pandas is read by
+            its names. If it is pending it is so no more; a trial that was never asked for is welcome too. A point
+            belongs to the nearest pending trial within 0.01 box widths in every variable, so that a rig may round it;
+            the model learns from the point as it is told. One beyond a bound by no more than the rounding of single
+            precision is on the bound (see `Box.rounding`).
+        y
+            One finite number.
+        failed
+            True: the place gave nothing. The trial counts for the model as the lowest value told so far, so that the
+            place is avoided. "rig": the place is not at fault (a camera hung, a person came in the way). The trial
+            leaves no trace, and its number is asked for again.
+        reached
+            Where the trial truly was, (d,), where that is known; inside of the box or not. The model learns from
+            there; more than 1e6 box widths away counts as 1e6. `recommend` answers inputs inside the box only.
 
         Raises
         ------
         InputError
-            If x or reached has the wrong shape, is not finite or lies outside the box; if y is missing, not finite or
-            not a number; if a failed trial comes with a value. Nothing told before is lost.
+            If x or reached has the wrong shape, other names or is not finite, or x lies outside the box; if an
+            `AskedTrial` has been told before; if y is missing, not finite or not a number; if a failed trial comes with
+            a value. Nothing told before is lost.
         """
-        self._trials.tell(x, y, failed, reached)
+        self._trials.tell(x, None if y is None else self._sign * number_of(y), failed, reached)
 
-    def forget(self, x: ArrayLike) -> None:
-        """Drop a pending trial at x (d,) that will never be told; raises InputError if it is not pending."""
+    def forget(self, x: Any) -> None:
+        """Drop a pending trial, an `AskedTrial` or its x (d,), that will never be told; its number is asked for again.
+
+        Raises InputError if it is not pending.
+        """
         self._trials.forget(x)
 
     def restore(
-        self, X: ArrayLike, y: ArrayLike, *, reached: ArrayLike | None = None, pending: ArrayLike | None = None
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        *,
+        reached: ArrayLike | None = None,
+        pending: ArrayLike | None = None,
+        numbers: ArrayLike | None = None,
     ) -> None:
         """Replace all trials by stored ones: X (t, d) with values y (t,), NaN for failed ones, and pending (p, d).
 
-        `reached` (t, d) are the inputs that were truly reached, X where None. What is asked next is what an optimizer
-        asks that was told these trials in this order.
+        `reached` (t, d) are the inputs that were truly reached, X where None. `numbers` (t + p,) are those of the
+        trials, the pending ones last; 0, 1, 2, ... where None. What is asked next is what an optimizer asks that was
+        told these trials in this order.
 
         Raises
         ------
         InputError
-            If shapes do not fit, an input is not finite or lies outside the box, or a value is infinite.
+            If shapes do not fit, an input is not finite, X or pending lie outside the box, or a value is infinite.
         """
         trials = Trials(self.box)
-        trials.restore(X, y, X if reached is None else reached, () if pending is None else pending)
+        trials.restore(
+            X,
+            self._sign * np.asarray(y, dtype=np.float64),
+            X if reached is None else reached,
+            () if pending is None else pending,
+            numbers,
+        )
         if not trials.equal(self._trials):
             self._cache = None
         self._trials = trials
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write settings and trials, pending ones included, into a JSON file, for `load`.
+
+        Raises InputError where it cannot be written.
+        """
+        saving.write(path, self.box, self._settings, self._trials)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], **settings: Any) -> "Optimizer":
+        """Return the optimizer that `save` has written: it asks and recommends what that one would.
+
+        Settings that are given replace stored ones; those that a file cannot hold must be: a surrogate that is an
+        object, a lattice, input noise that varies. (The chains of the thesis presets start anew.)
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read or holds no optimizer, or such a setting is missing.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from surehold import Box, Optimizer
+        >>> optimizer = Optimizer(Box({"x": (0.0, 1.0)}), seed=3)
+        >>> optimizer.tell(optimizer.ask(), 0.5)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     optimizer.save(f"{folder}/run.json")
+        ...     again = Optimizer.load(f"{folder}/run.json")
+        >>> bool(again.ask() == optimizer.ask())
+        True
+        """
+        box, found, trials = saving.read(path, settings)
+        optimizer = cls(box, **found)
+        optimizer._trials = trials
+        return optimizer
 
     # --- ask ----------------------------------------------------------------------------------------------------
 
@@ -250,24 +356,42 @@ class Optimizer:
         Points asked for are pending until they are told: further asks keep away from them.
 
         `number` is the number of the (first) trial asked for, 0 for the first of all: its place in the initial design
-        and in the random sequence. By default as many as are told or pending.
+        and in the random sequence. By default the lowest that is free.
         """
-        first = len(self._trials) + len(self._trials.pending) if number is None else _count("number", number, 0)
         if n is None:
-            return self._ask_one(first, number is None)
-        return np.array([self._ask_one(first + i, number is None) for i in range(_count("n", n, 1))])
+            return self._ask_one(number).x
+        return np.array([trial.x for trial in self._ask(n, number)])
 
-    def _ask_one(self, position: int, by_count: bool) -> NDArray[np.float64]:
+    def ask_trial(self, n: int | None = None) -> AskedTrial | list[AskedTrial]:
+        """Ask as `ask` does, for trials that know their numbers: `tell` takes one in place of x.
+
+        However a rig rounds or names its inputs, the answer belongs to the trial that was asked for.
+
+        Examples
+        --------
+        >>> from surehold import Box, Optimizer
+        >>> optimizer = Optimizer(Box({"temperature": (20.0, 120.0)}), seed=0)
+        >>> trial = optimizer.ask_trial()
+        >>> optimizer.tell(trial, 0.7, reached=trial.x.round())
+        >>> len(optimizer.pending)
+        0
+        """
+        return self._ask_one(None) if n is None else self._ask(n, None)
+
+    def _ask(self, n: int, number: int | None) -> list[AskedTrial]:
+        return [self._ask_one(None if number is None else number + i) for i in range(_count("n", n, 1))]
+
+    def _ask_one(self, number: int | None) -> AskedTrial:
+        position = self._trials.next_number if number is None else _count("number", number, 0)
         if position < self.n_initial:
-            u = self._design[self._unused_place(position) if by_count else position]
+            u = self._design[self._unused_place(position) if number is None else position]
         elif not self._trials.successful.any():
             u = self._rng(2, position).random(self.box.dimension)  # every trial failed or is pending: keep covering
         else:
             with single_threaded():
                 u = self._propose(self._rng(2, position))
         u = self._snapped(u)
-        self._trials.ask(u)
-        return self.box.from_unit(u)
+        return AskedTrial(self._trials.ask(position, u), self.box.from_unit(u))
 
     def _unused_place(self, position: int) -> int:
         """Return the place in the design to ask for next: the position, or the first unused one after a `forget`."""
@@ -326,8 +450,9 @@ class Optimizer:
                 u,
                 self.box.from_unit(u),
                 observed,
-                (history.tried[highest], float(self._trials.values[self._trials.successful][highest])),
-                len(history.observed),
+                (history.tried[highest], float(history.observed[highest])),
+                int(self._trials.successful.sum()),
+                self._sign,
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
                 self._execution_noise(),
             )
@@ -341,7 +466,7 @@ class Optimizer:
         perturbations = self._ranking.accurate if under_noise else Perturbations(exact(self.box.dimension))
         with single_threaded():
             mean, variance = mixture(perturbations.outcome(self._posterior(), U))
-        return mean, np.sqrt(variance)
+        return self._sign * mean, np.sqrt(variance)
 
     def promise(self) -> float:
         """Return the largest improvement that a further input is expected to bring, in the outputs' units.
@@ -375,6 +500,13 @@ class Optimizer:
         with single_threaded():
             return self._posterior()
 
+    def __repr__(self) -> str:
+        parts = [f"{len(self._trials)} trials", f"{len(self._trials.pending)} pending"]
+        found = self.y[np.isfinite(self.y)]
+        if len(found):
+            parts.append(f"best {self._sign * (self._sign * found).max():.6g}")
+        return f"<Optimizer of {', '.join(self.box.names)} ({self.direction}): {', '.join(parts)}>"
+
     # --- inside -------------------------------------------------------------------------------------------------
 
     @property
@@ -383,9 +515,9 @@ class Optimizer:
 
     @property
     def _history(self) -> History:
-        told = self._trials.successful
+        told = self._trials.eligible  # those that reached a place outside of the box are no answer, as failed ones
         return History(
-            self._trials.reached[told], self._trials.modelled[told], self._trials.reached[~told], self._trials.pending
+            self._trials.places[told], self._trials.modelled[told], self._trials.reached[~told], self._trials.pending
         )
 
     def _posterior(self) -> Posterior:

@@ -7,7 +7,7 @@ Two distributions, both mixtures of normals:
                   noise; what is left of its spread is what the model does not know
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -62,32 +62,51 @@ class Outcome:
         return 0.5 * (low + high)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recommendation:
-    """The input to use, and what to expect of it when it is perturbed."""
+    """The input to use, and what to expect of it when it is perturbed; values in the sign in which they were told.
+
+    Attributes
+    ----------
+    x : (d,)
+        In the box's units.
+    mean
+        Expected outcome under the input noise.
+    std
+        Standard deviation of one execution: input noise, observation noise and what the model does not know.
+    quantile
+        The value that 95 % of executions are better than: they exceed it, or stay below where the optimizer minimizes.
+    observed
+        Value that was told at x; NaN where x was never tried.
+    n
+        Trials with a value that the recommendation rests on.
+    outcome_std
+        Standard deviation, over the input noise, of the model's mean: the risk left to take; unscented variance (4.1).
+    refused
+        Why the best observed trial was not recommended; empty where it was.
+    outliers
+        Trials, from 0 in the order told, whose values are too far on the bad side of all others to be believed.
+    execution : Outcome
+        Distribution of the value of one execution.
+    expectation : Outcome
+        Distribution of the mean of many executions: what the model does not know of it.
+    """
 
     x: NDArray[np.float64]
-    """(d,), in the box's units"""
     mean: float
-    """expected outcome under the input noise"""
     std: float
-    """standard deviation of one execution: input noise, observation noise and what the model does not know"""
     quantile: float
-    """value that 95 % of executions exceed"""
     observed: float
-    """value that was told at x; NaN where x was never tried"""
     n: int
-    """trials with a value that the recommendation rests on"""
     outcome_std: float
-    """standard deviation, over the input noise, of the model's mean: the risk left to take; unscented variance (4.1)"""
     refused: str
-    """why the highest observed trial was not recommended; empty where it was"""
     outliers: tuple[int, ...]
-    """trials, from 0 in the order told, whose values lie too far below the others to be believed"""
-    execution: Outcome = field(repr=False)
-    """distribution of the value of one execution"""
-    expectation: Outcome = field(repr=False)
-    """distribution of the mean of many executions: what the model does not know of it"""
+    execution: Outcome
+    expectation: Outcome
+
+    def __repr__(self) -> str:
+        x = np.array2string(self.x, precision=6, separator=", ")
+        return f"Recommendation(x={x}, mean={self.mean:.6g}, std={self.std:.3g}, quantile={self.quantile:.6g})"
 
     def probability_below(self, value: float) -> float:
         """Return the probability that the next execution gives less than `value`."""
@@ -122,11 +141,16 @@ def recommendation(
     observed: float,
     highest: tuple[NDArray[np.float64], float],
     n: int,
+    sign: float = 1.0,
     outliers: tuple[int, ...] = (),
     noise_variance: float | None = None,
 ) -> Recommendation:
-    """Describe u (d,) of the unit cube, x in the box's units; `highest` is the best observed trial and its value."""
+    """Describe u (d,) of the unit cube, x in the box's units; `highest` is the best observed trial and its value.
+
+    `sign` is that of the values in which the answer is given: -1 where what was told has been turned over.
+    """
     outcome = execution_at(posterior, reached, u, noise_variance)
+    expectation = expectation_at(posterior, reached, u)
     moments, _ = sigma_points.spread(posterior, u[None, :])
     means, weights = moments.mean.mean(axis=0), sigma_points.quadrature.weights
     spread = means - weights @ means
@@ -135,21 +159,23 @@ def recommendation(
     refused = ""
     if np.any(np.abs(highest[0] - u) > 1e-6):
         other = execution_at(posterior, reached, highest[0], noise_variance)
+        best, worse = ("highest", "less") if sign > 0.0 else ("lowest", "more")
         refused = (
-            f"The highest observed trial gave {highest[1]:.4g}, but under the noise {other.mean:.4g} is expected, "
-            f"and less than {other.quantile(_LEVEL):.4g} once in twenty executions; of the recommended one "
-            f"{outcome.mean:.4g} is expected, and less than {outcome.quantile(_LEVEL):.4g} once in twenty."
+            f"The {best} observed trial gave {sign * highest[1]:.4g}, but under the noise {sign * other.mean:.4g} is "
+            f"expected, and {worse} than {sign * other.quantile(_LEVEL):.4g} once in twenty executions; of the "
+            f"recommended one {sign * outcome.mean:.4g} is expected, and {worse} than "
+            f"{sign * outcome.quantile(_LEVEL):.4g} once in twenty."
         )
     return Recommendation(
         x,
-        outcome.mean,
+        sign * outcome.mean,
         outcome.std,
-        outcome.quantile(_LEVEL),
-        observed,
+        sign * outcome.quantile(_LEVEL),
+        sign * observed,
         n,
         unit * float(np.sqrt(max(variance, 0.0))),
         refused,
         outliers,
-        outcome,
-        expectation_at(posterior, reached, u),
+        Outcome(sign * outcome.means, outcome.stds),
+        Outcome(sign * expectation.means, expectation.stds),
     )

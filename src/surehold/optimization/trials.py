@@ -1,19 +1,40 @@
 """The record of trials: what was commanded, what was reached, what came of it, and what is still under way.
 
 Legend: u (d,) a point of the unit cube, x the same point in the box's units; t trials told, p pending.
+
+A trial is known by its number, or by its place: what is told at x belongs to the nearest pending trial within
+`ROUNDED` box widths. Numbers count from 0; one that was forgotten is given out again before any new one.
 """
 
-from typing import Final
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.errors import InputError
+from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
+from surehold.optimization.points import numbers_of
 
-__all__ = ["OUTLIER_DISTANCE", "Trials", "same"]
+__all__ = ["OUTLIER_DISTANCE", "ROUNDED", "AskedTrial", "Trials", "initial_inputs", "number_of", "same"]
 
 _SEPARATION: Final = 1e-6  # points closer than this in every coordinate of the unit cube are the same trial
+#: A rig rounds to its resolution: what is told within so many box widths, in every variable, of a pending trial is it.
+ROUNDED: Final = 0.01
+# A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
+# it stay finite.
+_FARTHEST: Final = 1e6
+
+
+@dataclass(frozen=True)
+class AskedTrial:
+    """A trial that has been asked for: give it to `Optimizer.tell` in place of x."""
+
+    number: int
+    """0 for the first of all"""
+    x: NDArray[np.float64]
+    """(d,), in the box's units"""
+
 
 #: Ranges of all other values by which an outlier lies below them.
 OUTLIER_DISTANCE: Final = 5.0
@@ -32,7 +53,8 @@ class Trials:
         self._commanded: list[NDArray[np.float64]] = []
         self._reached: list[NDArray[np.float64]] = []
         self._values: list[float] = []
-        self._pending: list[NDArray[np.float64]] = []
+        self._numbers: list[int] = []
+        self._pending: dict[int, NDArray[np.float64]] = {}
 
     def __len__(self) -> int:
         """Number of trials told, t."""
@@ -45,7 +67,7 @@ class Trials:
 
     @property
     def reached(self) -> NDArray[np.float64]:
-        """Reached inputs in the unit cube, (t, d): the commanded ones where nothing else was told."""
+        """Reached inputs (t, d), the unit cube being the box; the commanded ones where nothing else was told."""
         return np.array(self._reached).reshape(-1, self._box.dimension)
 
     @property
@@ -59,14 +81,40 @@ class Trials:
         return np.array(self._values, dtype=np.float64)
 
     @property
+    def numbers(self) -> NDArray[np.intp]:
+        """Numbers of the trials told, (t,)."""
+        return np.array(self._numbers, dtype=np.intp)
+
+    @property
     def successful(self) -> NDArray[np.bool_]:
         """Whether each trial gave a value, (t,)."""
         return np.isfinite(self.values)
 
     @property
+    def eligible(self) -> NDArray[np.bool_]:
+        """Whether each trial gave a value at an input that can be commanded again, (t,).
+
+        Those that reached a place outside of the box teach the model, but are no answer; where all of them did, the
+        nearest points of the box are: see `places`.
+        """
+        successful = self.successful
+        inside = successful & np.all((self.reached >= 0.0) & (self.reached <= 1.0), axis=1)
+        return inside if inside.any() else successful
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """Reached inputs (t, d), those outside of the unit cube replaced by the nearest points of it."""
+        return np.clip(self.reached, 0.0, 1.0)
+
+    @property
     def pending(self) -> NDArray[np.float64]:
         """Inputs asked for and not told yet, in the unit cube, (p, d)."""
-        return np.array(self._pending).reshape(-1, self._box.dimension)
+        return np.array(list(self._pending.values())).reshape(-1, self._box.dimension)
+
+    @property
+    def pending_numbers(self) -> list[int]:
+        """Numbers of the pending trials."""
+        return list(self._pending)
 
     @property
     def outliers(self) -> NDArray[np.bool_]:
@@ -91,39 +139,67 @@ class Trials:
         sound = self.successful & ~self.outliers
         return np.where(sound, values, values[sound].min())
 
-    def ask(self, u: NDArray[np.float64]) -> None:
-        """Record that a trial at u (d,) is under way."""
-        self._pending.append(u)
+    @property
+    def next_number(self) -> int:
+        """The lowest number that no trial told or pending has."""
+        used = {*self._numbers, *self._pending}
+        return next(number for number in range(len(used) + 1) if number not in used)
 
-    def tell(self, x: ArrayLike, y: float | None, failed: bool, reached: ArrayLike | None) -> None:
+    def ask(self, number: int, u: NDArray[np.float64]) -> int:
+        """Record that a trial at u (d,) is under way, and return its number: another one where that is taken."""
+        number = self.next_number if number in self._pending or number in self._numbers else number
+        self._pending[number] = u
+        return number
+
+    def tell(self, x: Any, y: float | None, failed: bool | str, reached: Any) -> None:
         """Record the outcome of a trial; see `Optimizer.tell`. Nothing is recorded where an argument is bad."""
-        commanded = self._inside("x", x)
-        actual = commanded if reached is None else self._inside("reached", reached)
+        if failed not in (False, True, "rig"):
+            raise unknown_name("kind of failure", failed, ("True", "rig"))
+        number, commanded, actual = self._commanded_by(x)
+        if reached is not None:
+            actual = self._anywhere("reached", reached)
         if failed and y is not None:
             raise InputError(f"a failed trial has no value, but y is {y!r}; leave one of the two out.")
-        value = np.nan if failed else _finite(y)
-        self._commanded.append(commanded)
-        self._reached.append(actual)
-        self._values.append(value)
-        index = self._waiting(commanded)
-        if index is not None:
-            del self._pending[index]
+        value = np.nan if failed else number_of(y)
+        if failed != "rig":
+            self._commanded.append(commanded)
+            self._reached.append(actual)
+            self._values.append(value)
+            self._numbers.append(self.next_number if number is None else number)
+        if number is not None:
+            del self._pending[number]
 
-    def restore(self, X: ArrayLike, y: ArrayLike, reached: ArrayLike, pending: ArrayLike) -> None:
+    def restore(
+        self, X: ArrayLike, y: ArrayLike, reached: ArrayLike, pending: ArrayLike, numbers: ArrayLike | None = None
+    ) -> None:
         """Take over stored trials; see `Optimizer.restore`. Nothing is taken over where an argument is bad."""
-        commanded, actual, waiting = (
-            self._all_inside(name, points) for name, points in (("X", X), ("reached", reached), ("pending", pending))
+        commanded, waiting = self._all("X", X, inside=True), self._all("pending", pending, inside=True)
+        self.restore_cube(commanded, y, self._all("reached", reached, inside=False), waiting, numbers)
+
+    def restore_cube(
+        self, commanded: ArrayLike, y: ArrayLike, reached: ArrayLike, pending: ArrayLike, numbers: ArrayLike | None
+    ) -> None:
+        """Take over trials whose inputs are points of the unit cube, as they are."""
+        d = self._box.dimension
+        inputs, actual, waiting = (
+            np.asarray(points, dtype=np.float64).reshape(-1, d) for points in (commanded, reached, pending)
         )
         values = np.asarray(y, dtype=np.float64)
-        if values.shape != (len(commanded),) or len(actual) != len(commanded):
+        if values.shape != (len(inputs),) or len(actual) != len(inputs):
             raise InputError(
-                f"y has shape {values.shape} and reached {len(actual)} rows, but X has {len(commanded)} rows; give one "
+                f"y has shape {values.shape} and reached {len(actual)} rows, but X has {len(inputs)} rows; give one "
                 "value and one reached input a trial."
             )
         if np.isinf(values).any():
             raise InputError(f"y holds infinity at row {int(np.argmax(np.isinf(values)))}; give NaN for failed trials.")
-        self._commanded, self._reached, self._pending = list(commanded), list(actual), list(waiting)
-        self._values = values.tolist()
+        total = len(inputs) + len(waiting)
+        given = np.arange(total) if numbers is None or total == 0 else np.asarray(numbers)
+        whole = given.shape == (total,) and given.dtype.kind in "iu" and np.all(given >= 0)
+        if not whole or len(np.unique(given)) < total:
+            raise InputError(f"numbers are {numbers!r}; give {total} different whole numbers, those pending last.")
+        self._commanded, self._reached = list(inputs), list(actual)
+        self._values, self._numbers = values.tolist(), given[: len(values)].tolist()
+        self._pending = dict(zip(given[len(values) :].tolist(), waiting, strict=True))
 
     def equal(self, other: "Trials") -> bool:
         """Tell whether the same trials have been told, in the same order; pending ones do not matter."""
@@ -133,49 +209,105 @@ class Trials:
             and np.array_equal(self.reached, other.reached)
         )
 
-    def forget(self, x: ArrayLike) -> None:
-        """Drop the pending trial at x (d,); raises InputError if there is none."""
-        index = self._waiting(self._box.to_unit(x))
-        if index is None:
+    def forget(self, x: Any) -> None:
+        """Drop the pending trial at x (d,), or an `AskedTrial`; raises InputError if there is none."""
+        number = self._numbered(x) if isinstance(x, AskedTrial) else self._waiting(self._box.to_unit(x))
+        if number is None:
             raise InputError(f"x = {self._box.as_dict(x)} is not pending; see Optimizer.pending.")
-        del self._pending[index]
+        del self._pending[number]
+
+    # --- which trial, and where ---------------------------------------------------------------------------------------
+
+    def _commanded_by(self, x: Any) -> tuple[int | None, NDArray[np.float64], NDArray[np.float64]]:
+        """Return the number of the pending trial that x belongs to, if any, and the commanded and the reached input."""
+        if isinstance(x, AskedTrial):
+            number = self._numbered(x)
+            return number, self._pending[number], self._pending[number]
+        u = self._anywhere("x", x)
+        number = self._waiting(u)
+        if np.all((u >= 0.0) & (u <= 1.0)):
+            return number, u, u
+        if number is None:
+            raise InputError(
+                f"x = {self._box.as_dict(x)} lies outside {self._box}; tell a point inside the box, or, where a trial "
+                "was commanded inside and went astray, tell(x, y, reached=...)."
+            )
+        return number, self._pending[number], u  # rounded beyond the border
+
+    def _numbered(self, trial: AskedTrial) -> int:
+        if trial.number not in self._pending:
+            raise InputError(
+                f"trial {trial.number} is not pending: it has been told or forgotten, or belongs to another optimizer."
+            )
+        return trial.number
 
     def _waiting(self, u: NDArray[np.float64]) -> int | None:
-        matches = np.flatnonzero(same(u, self.pending))
-        return int(matches[0]) if len(matches) else None
+        """Return the number of the nearest pending trial within `ROUNDED`, of equals the one asked for first."""
+        if not self._pending or u.ndim != 1:
+            return None
+        distances = np.abs(self.pending - u).max(axis=1)
+        nearest = int(np.argmin(distances))
+        return list(self._pending)[nearest] if distances[nearest] <= ROUNDED else None
 
-    def _all_inside(self, name: str, X: ArrayLike) -> NDArray[np.float64]:
-        """Return points (k, d) as points of the cube."""
-        points = np.asarray(X, dtype=np.float64)
-        points = points.reshape(-1, self._box.dimension) if points.size == 0 else points
-        U = self._box.to_unit(points)
+    def _all(self, name: str, X: ArrayLike, inside: bool) -> NDArray[np.float64]:
+        """Return points (k, d), the unit cube being the box."""
+        none = not hasattr(X, "columns") and np.size(X) == 0
+        points = np.empty((0, self._box.dimension)) if none else self._box.points(X)
+        U = self._near(points)
         if U.ndim != 2:
             raise InputError(f"{name} has shape {U.shape}; give one row a trial, (t, {self._box.dimension}).")
-        if not (np.isfinite(U).all() and self._box.contains(points)):
-            bad = next(p for p in points if not (np.isfinite(p).all() and self._box.contains(p)))
-            raise InputError(f"{name} holds {self._box.as_dict(bad)}, which is not inside {self._box}.")
-        return np.clip(U, 0.0, 1.0)
+        sound = np.isfinite(points).all(axis=1)
+        if inside:
+            sound &= np.all((U >= 0.0) & (U <= 1.0), axis=1)
+        if not sound.all():
+            bad = points[int(np.argmin(sound))]
+            wanted = f"not inside {self._box}" if inside else "not finite"
+            raise InputError(f"{name} holds {self._box.as_dict(bad)}, which is {wanted}.")
+        return U
 
-    def _inside(self, name: str, x: ArrayLike) -> NDArray[np.float64]:
-        u = self._box.to_unit(x)
+    def _anywhere(self, name: str, x: Any) -> NDArray[np.float64]:
+        """Return the finite point x (d,), the unit cube being the box."""
+        points = self._box.points(x)
+        u = self._near(points)
         if u.ndim != 1:
             raise InputError(
                 f"{name} has shape {u.shape}; tell one trial at a time, of shape ({len(self._box.names)},)."
             )
-        if not np.all(np.isfinite(u)):
-            raise InputError(f"{name} is {np.asarray(x).tolist()}; every coordinate must be a finite number.")
-        if not self._box.contains(x):
-            raise InputError(f"{name} = {self._box.as_dict(x)} lies outside {self._box}; tell a point inside the box.")
-        return np.clip(u, 0.0, 1.0)
+        if not np.all(np.isfinite(points)):
+            raise InputError(f"{name} is {points.tolist()}; every coordinate must be a finite number.")
+        return u
+
+    def _near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return points of the unit cube; what lies beyond a bound by no more than rounding is on it."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            U = self._box.to_unit(points)
+            slack = self._box.rounding / self._box.widths
+            U = np.where(-slack > U, U, np.maximum(U, 0.0))
+            U = np.where(1.0 + slack < U, U, np.minimum(U, 1.0))
+            return np.clip(U, -_FARTHEST, _FARTHEST)
 
 
-def _finite(y: float | None) -> float:
+def initial_inputs(box: Box, points: Any) -> NDArray[np.float64]:
+    """Return points to be tried first as points (i, d) of the unit cube; raises InputError where one lies outside."""
+    if points is None:
+        return np.empty((0, box.dimension))
+    rows = [box.points(point) for point in points] if isinstance(points, (list, tuple)) else box.points(points)
+    trials = Trials(box)
+    trials.restore(
+        np.reshape(rows, (-1, box.dimension)), np.zeros(len(rows)), np.reshape(rows, (-1, box.dimension)), ()
+    )
+    return trials.commanded
+
+
+def number_of(y: Any) -> float:
+    """Return the value of a trial as a float; raises InputError where it is not one finite number."""
     if y is None:
         raise InputError("the trial has no value; give y, or failed=True for a trial that gave nothing.")
     try:
-        value = np.asarray(y, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"y is {y!r}; give one finite number, or failed=True.") from None
+        value = numbers_of(y)
+    except (TypeError, ValueError, OverflowError):
+        shown = " ".join(repr(y).split())
+        raise InputError(f"y is {shown}; give one finite number, or failed=True.") from None
     if value.size != 1 or not np.isfinite(value).all():
         raise InputError(f"y is {y!r}; give one finite number, or failed=True for a trial that gave nothing.")
     return float(value.reshape(()))

@@ -11,6 +11,7 @@ from surehold.reports import figures
 from surehold.reports.campaign_report import CampaignReport, Table
 from surehold.reports.page import TEMPLATES, environment, scene_context
 from surehold.reports.run_report import Candidate
+from surehold.studies.csv_cells import written_cell
 
 __all__ = ["csv_text", "markdown_table", "render_campaigns"]
 
@@ -49,8 +50,7 @@ def csv_text(table: Table) -> str:
     """Return a table as CSV."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(table.head)
-    writer.writerows(table.rows)
+    writer.writerows([written_cell(cell) for cell in row] for row in (table.head, *table.rows))
     return buffer.getvalue()
 
 

@@ -143,8 +143,8 @@ def _draw_candidate(axes: "Axes", report: RunReport, candidate: Candidate, pair:
     role = _role(report, candidate)
     scale = np.array([report.variables[k].factor for k in pair])
     center = candidate.x[list(pair)] * scale
-    if report.noise is not None:
-        covariance = report.noise[np.ix_(pair, pair)] * np.outer(scale, scale)
+    if candidate.noise is not None:
+        covariance = candidate.noise[np.ix_(pair, pair)] * np.outer(scale, scale)
         values, vectors = np.linalg.eigh(covariance)
         angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
         width, height = 4.0 * np.sqrt(np.maximum(values[::-1], 0.0))  # two standard deviations to each side
@@ -183,7 +183,7 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
     )
     for candidate in report.candidates:
         role = _role(report, candidate)
-        spread = 0.0 if report.noise is None else 2.0 * float(np.sqrt(report.noise[i, i])) * variable.factor
+        spread = 0.0 if candidate.noise is None else 2.0 * float(np.sqrt(candidate.noise[i, i])) * variable.factor
         axes.errorbar(
             candidate.x[i] * variable.factor,
             candidate.quality,

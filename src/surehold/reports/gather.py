@@ -11,7 +11,7 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.maximization import Result
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.noise.quadratures import sigma_points
+from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.surrogates.protocol import Posterior, mixture
 from surehold.problems.perturbation import RobustScore
 from surehold.reports.run_report import (
@@ -87,6 +87,9 @@ def report_of(
     notes: Sequence[str] = (),
     choices: Mapping[str, tuple[str, ...]] | None = None,
     hidden: Collection[str] = (),
+    success_above: float | None = None,
+    outcomes: Mapping[str, int] | None = None,
+    advice: str = "",
 ) -> RunReport:
     """Return the report of a run: its trials, its candidates, its traces and its model.
 
@@ -100,6 +103,8 @@ def report_of(
         Text of each trial for parameters that are no numbers, by name.
     hidden
         Coordinates of the box that say nothing to a reader: those in which the choices are coded.
+    success_above, outcomes, advice
+        Of `RunReport`: what counts as a success, and what is said where there was none.
 
     Raises
     ------
@@ -131,15 +136,22 @@ def report_of(
         y=y,
         n_initial=optimizer.n_initial,
         best_trace=_running_maximum(y),
-        candidates=tuple(replace(candidate, x=candidate.x[shown]) for candidate in candidates),
+        candidates=tuple(
+            replace(
+                candidate,
+                x=candidate.x[shown],
+                noise=None if noise is None else _covariance_at(noise, box, candidate.x)[np.ix_(shown, shown)],
+            )
+            for candidate in candidates
+        ),
         settings=settings,
         seed=optimizer.seed,
         quality_name=quality_name,
         disturbance=disturbance,
         robust_trace=robust if np.isfinite(robust).any() else None,
-        noise=None
-        if noise is None
-        else (noise.unit_covariance(box) * np.outer(box.widths, box.widths))[shown][:, shown],
+        success_above=success_above,
+        outcomes=outcomes or {},
+        advice=advice,
         surfaces=surfaces_of(optimizer.posterior, box, noise, candidates[-1].x, shown),
         interrupted=result.interrupted,
         planned_trials=planned_trials,
@@ -206,12 +218,17 @@ def _surface(
     mean, variance = mixture(posterior.moments(queries))
     robust_mean = robust_std = None
     if noise is not None:
-        averaged, spread = mixture(posterior.average(queries, *sigma_points(noise.unit_covariance(box))))
+        averaged, spread = mixture(Perturbations.of(noise, box, "unscented").outcome(posterior, queries))
         robust_mean, robust_std = averaged.reshape(shape), np.sqrt(spread).reshape(shape)
     axes = tuple(box.lower[k] + line * box.widths[k] for k in variables)
     return Surface(
         variables, axes, mean.reshape(shape), robust_mean, np.sqrt(variance).reshape(shape), robust_std, note
     )
+
+
+def _covariance_at(noise: InputNoise, box: Box, x: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return the covariance (d, d) of the noise at x, in the units of the box."""
+    return noise.unit_covariance(box, x) * np.outer(box.widths, box.widths)
 
 
 def _most_important(posterior: Posterior, center: NDArray[np.float64], among: Sequence[int]) -> list[int]:

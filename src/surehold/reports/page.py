@@ -124,6 +124,8 @@ def _label(report: RunReport, candidate: Candidate) -> dict[str, str]:
     alone = len(report.candidates) == 1
     role = "high" if candidate is report.highest and not alone else "answer"
     text = "Highest observed = recommended" if alone else candidate.label.capitalize()
+    if not report.succeeded:
+        role, text = "high", f"No success: {'the highest trial' if alone else candidate.label}"
     return {"role": role, "mark": "▲" if role == "high" else "●", "text": text}
 
 
@@ -220,6 +222,7 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
     if any(c.values.size for c in every):
         n = max(c.values.size + c.n_failed for c in every)
         rows.append(row(f"mean of {n} perturbed re-queries", lambda c: number(c.mean, 4)))
+        rows.append(row("5 % quantile of them", lambda c: number(c.low, 4)))
         rows.append(row("worst of them", lambda c: number(c.worst, 4)))
         rows.append(row("standard deviation", lambda c: number(c.std, 3)))
         if any(c.n_failed for c in every):

@@ -119,6 +119,7 @@ class Candidate:
     pose: str = ""  #: pose and posture in words
     details: Mapping[str, str] = field(default_factory=dict)  #: further lines of the table
     scene: Scene | None = None
+    noise: Floats | None = None  #: (d, d) covariance of the input noise at x, in the units of the box
 
     @property
     def mean(self) -> float:
@@ -131,6 +132,11 @@ class Candidate:
         if self.values.size == 0:
             return float("nan")
         return float(np.std(self.values, ddof=1)) if self.values.size > 1 else 0.0
+
+    @property
+    def low(self) -> float:
+        """5 % quantile of the re-queries; NaN if there are none."""
+        return float(np.quantile(self.values, 0.05)) if self.values.size else float("nan")
 
     @property
     def worst(self) -> float:
@@ -167,7 +173,9 @@ class RunReport:
     quality_name: str = "value"
     disturbance: str = "the input is off"  #: what an imprecise execution is called, such as "the hand is off"
     robust_trace: Floats | None = None  #: (n,) expected value under the noise of the current recommendation
-    noise: Floats | None = None  #: (d, d) covariance of the input noise, in the units of the box
+    success_above: float | None = None  #: what a trial that succeeds is worth more than; None where any value will do
+    outcomes: Mapping[str, int] = field(default_factory=dict)  #: how many trials ended how, where none succeeded
+    advice: str = ""  #: what to try where no trial succeeded
     surfaces: tuple[Surface, ...] = ()
     interrupted: bool = False
     planned_trials: int | None = None
@@ -188,6 +196,17 @@ class RunReport:
         for candidate in self.candidates:
             if candidate.x.shape != (d,):
                 raise InputError(f"candidate '{candidate.label}' has x of shape {candidate.x.shape}; it needs ({d},).")
+
+    @property
+    def noise(self) -> Floats | None:
+        """(d, d) covariance of the input noise at the recommended point, in the units of the box."""
+        return self.recommended.noise
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether any trial succeeded."""
+        told = self.y[~self.failed]
+        return bool(told.size) and (self.success_above is None or float(told.max()) > self.success_above)
 
     @property
     def failed(self) -> NDArray[np.bool_]:

@@ -2,10 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from surehold.reports.run_report import Candidate, RunReport
+
+_NOTABLE: Final = 0.1  # share of the range of the values met from which on bad cases count as different
 
 __all__ = ["Verdict", "change", "coordinates", "halved", "number", "verdict"]
 
@@ -49,6 +52,8 @@ def verdict(report: RunReport) -> Verdict:
     highest, answer = report.highest, report.recommended
     name, off = report.quality_name, report.disturbance
     told = report.y[~report.failed]
+    if not report.succeeded:
+        return _of_nothing(report)
     if told.size > 1 and told.max() == told.min():
         return Verdict(
             f"All {told.size} trials gave the same {name}, {number(float(told[0]))}: nothing was found.",
@@ -77,7 +82,7 @@ def verdict(report: RunReport) -> Verdict:
             why = "The model expects no other trial to hold better."
         return Verdict(
             f"The highest trial is also the recommended one: {number(answer.quality)} when hit exactly, "
-            f"{number(answer.mean)} on average when {off}.",
+            f"{number(answer.mean)} on average and {number(answer.worst)} at worst when {off}.",
             f"{_sentence(answer, 'The recommended point', name)} {why}",
             False,
         )
@@ -93,24 +98,72 @@ def verdict(report: RunReport) -> Verdict:
             f"{lost} of {highest.values.size} cases, the recommended point in {kept or 'none'}."
         )
         return Verdict(headline, text, True)
+    tail = _tail(report)
+    means, worsts = (f"{number(highest.mean)} and {number(answer.mean)}", f"{number(highest.worst)} at worst")
+    if abs(gap) <= 2.0 * error and tail > 0:
+        headline = (
+            f"The highest peak ({number(highest.quality)}) was refused: when {off} it falls to {worsts}, the "
+            f"recommended point to {number(answer.worst)}; on average they are worth about the same, {means}."
+        )
+        return Verdict(headline, text, True)
+    if abs(gap) <= 2.0 * error and tail < 0:
+        headline = (
+            f"When {off}, the highest trial and the recommended one are worth about the same on average ({means}), but "
+            f"the recommended one falls to {number(answer.worst)} at worst, the other to {number(highest.worst)}."
+        )
+        return Verdict(headline, text, False)
     if abs(gap) <= 2.0 * error:
         headline = (
-            f"When {off}, the highest trial and the recommended one are worth about the same: "
-            f"{number(highest.mean)} and {number(answer.mean)}."
+            f"When {off}, the highest trial and the recommended one are worth about the same: {means} on average, "
+            f"{number(highest.worst)} and {number(answer.worst)} at worst."
         )
         return Verdict(headline, text, False)
     if gap > 0.0:
+        deeper = answer.worst < highest.worst - _notable(report)
+        yet = f", but falls to {number(answer.worst)} at worst (the peak to {number(highest.worst)})" * deeper
         headline = (
             f"The highest peak ({number(highest.quality)}) was refused: when {off} it is worth only "
-            f"{number(highest.mean)}, the recommended point {number(answer.mean)}."
+            f"{number(highest.mean)}, the recommended point {number(answer.mean)}{yet}."
         )
         return Verdict(headline, text, True)
+    holds = f", although it falls only to {number(answer.worst)} at worst (the peak to {number(highest.worst)})"
     headline = (
         f"The model preferred a lower point, but the re-queries do not bear it out: when {off} it is worth "
-        f"{number(answer.mean)}, the highest peak {number(highest.mean)}."
+        f"{number(answer.mean)}, the highest peak {number(highest.mean)}{holds * (tail > 0)}."
     )
     text += " More trials near both points would let the model see this."
     return Verdict(headline, text, False)
+
+
+def _of_nothing(report: RunReport) -> Verdict:
+    """Return the verdict where no trial succeeded: no winner among them."""
+    counts = sorted(report.outcomes.items(), key=lambda item: -item[1])
+    ended = "; ".join(f"{n} × {status}" for status, n in counts)
+    limit = number(report.success_above)
+    return Verdict(
+        f"None of {report.y.size} trials succeeded: no {report.quality_name} above {limit} was met.",
+        f"{f'How they ended: {ended}. ' if ended else ''}The point shown is no answer. {report.advice}".strip(),
+        False,
+    )
+
+
+def _notable(report: RunReport) -> float:
+    """Return from which difference on bad cases count as different, in the units of the values."""
+    told = report.y[~report.failed]
+    return _NOTABLE * float(told.max() - told.min())
+
+
+def _tail(report: RunReport) -> int:
+    """Return 1 where the recommended point's bad cases are better than the highest one's, -1 if worse, 0 if alike.
+
+    Compared are the 5 % quantile and the worst of the re-queries; the first that differs by more than `_NOTABLE` of the
+    range of values that the run met decides.
+    """
+    highest, answer = report.highest, report.recommended
+    for difference in (answer.low - highest.low, answer.worst - highest.worst):
+        if abs(difference) > _notable(report):
+            return 1 if difference > 0.0 else -1
+    return 0
 
 
 def _of_the_model(report: RunReport) -> Verdict:

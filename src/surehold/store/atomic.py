@@ -1,5 +1,6 @@
 """Files that are written whole or not at all, whoever reads or writes them at the same time."""
 
+import itertools
 import os
 import tempfile
 from collections.abc import Iterator
@@ -9,7 +10,7 @@ from typing import BinaryIO
 
 from surehold.errors import InputError
 
-__all__ = ["checked_folder", "replacing", "write_file"]
+__all__ = ["checked_folder", "new_folder", "replacing", "write_file"]
 
 
 @contextmanager
@@ -66,3 +67,25 @@ def checked_folder(folder: str | Path) -> Path:
             f"output folder '{path}' cannot be written ({error.strerror or error}); choose another (--out)."
         ) from None
     return path
+
+
+def new_folder(folder: str | Path) -> Path:
+    """Create a folder that did not exist and return its path: FOLDER, or the first that is free of FOLDER-2, ...
+
+    Raises
+    ------
+    InputError
+        As `checked_folder`.
+    """
+    path = Path(folder)
+    checked_folder(path.parent)
+    for number in itertools.count(1):
+        new = path if number == 1 else path.with_name(f"{path.name}-{number}")
+        try:
+            new.mkdir()
+        except FileExistsError:
+            continue
+        except OSError:
+            pass  # checked_folder says what is wrong
+        return checked_folder(new)
+    raise AssertionError("counting does not end")

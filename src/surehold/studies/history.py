@@ -33,7 +33,7 @@ class History(NamedTuple):
     y: NDArray[np.float64]
     """values (t,), larger is better; NaN for failed trials"""
     reached: NDArray[np.float64]
-    """inputs truly reached (t, d)"""
+    """inputs truly reached (t, d), inside the box or not"""
     pending: NDArray[np.float64]
     """inputs under way (p, d)"""
     numbers: NDArray[np.intp]
@@ -61,14 +61,14 @@ def history_of(trials: Iterable[FrozenTrial], space: SearchSpace, maximize: bool
         value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
         told.append(parameters)
         actual = parameters | trial.user_attrs.get(REACHED, {})
-        reached.append(actual if space.contains(actual) else parameters)
+        reached.append(actual if space.encodes(actual) else parameters)
         values.append(value if np.isfinite(value) else np.nan)
         numbers.append(trial.number)
     y = np.array(values, dtype=np.float64)
     return History(
         space.encode_all(told),
         y if maximize else -y,
-        space.encode_all(reached),
+        space.encode_all(reached, anywhere=True),
         space.encode_all(pending),
         np.array(numbers, dtype=np.intp),
     )

@@ -38,6 +38,7 @@ NOTE: Final = "surehold:note"
 VETOED: Final = "surehold:vetoed"
 
 _ATTEMPTS: Final = 5  # a trial that has taken so many workers with it counts as failed
+_LARGEST: Final = 1e100  # magnitude of a value; squares and variances of larger ones overflow
 
 
 class UnknownTrial(InputError):
@@ -141,7 +142,7 @@ class Ledger:
         """Store an answer; see `RobotStudy.tell`."""
         number = checked_value(value, failed)
         trial = self.trial(id)
-        actual = None if reached is None else self._space.check(trial.params | dict(reached), "reached")
+        actual = None if reached is None else self._space.check_reached(trial.params, reached)
         if trial.state == TrialState.WAITING:
             raise AnswerRefused(f"trial {id} has not been handed out yet; ask for it first.")
         state = "failed" if number is None else "complete"
@@ -206,5 +207,7 @@ def checked_value(value: Any, failed: bool) -> float | None:
     except (TypeError, ValueError, OverflowError):
         number = float("nan")
     if not isfinite(number):
-        raise InputError(f"value is {value!r}; tell one finite number, or that the trial failed.")
+        raise InputError(f"value is {str(value)[:60]!r}; tell one finite number, or that the trial failed.")
+    if abs(number) > _LARGEST:
+        raise InputError(f"value is {number:g}, of which no model can be made; tell it in another unit, or as failed.")
     return number

@@ -1,4 +1,7 @@
-"""Parameters as a person types them: `dx=-0.05:0.05, force=0.1:100:log, fingers=2:5:int, grip=pinch|power`."""
+"""Parameters as a person types them: `dx=-0.05:0.05, force=0.1:100:log, fingers=2:5:int, grip=pinch/power`.
+
+Choices are separated by "/", which needs no quotes in a shell, or by "|".
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -57,8 +60,9 @@ def parse_assignments(text: str, what: str) -> dict[str, str]:
 
 
 def _distribution(name: str, described: str) -> BaseDistribution:
-    if "|" in described:
-        return CategoricalDistribution([choice.strip() for choice in described.split("|")])
+    for between in ("|", "/"):  # "/" needs no quotes in a shell; with "|", choices may hold a "/"
+        if between in described:
+            return CategoricalDistribution([choice.strip() for choice in described.split(between)])
     lower, *rest = described.split(":")
     if not rest:
         raise ValueError("one number is no range")

@@ -214,13 +214,13 @@ class RobotStudy:
         failed
             Whether the trial gave nothing; then there is no value.
         reached
-            The parameters that were truly reached, all of them or those that differ.
+            The parameters that were truly reached, all of them or those that differ; they may lie outside the ranges.
 
         Raises
         ------
         InputError
-            If there is no such trial, the value is not finite, what was reached lies outside the ranges, or the trial
-            was told something else before. What was told before stays.
+            If there is no such trial, the value or what was reached is not finite, or the trial was told something else
+            before. What was told before stays.
         """
         with self.storage.failures():
             return self._ledger.tell(id, value, failed, reached)
@@ -239,7 +239,7 @@ class RobotStudy:
         commanded = self.settings.space.check(parameters)
         marks: dict[str, Any] = {NOTE: note}
         if reached is not None:
-            marks[REACHED] = self.settings.space.check(commanded | dict(reached), "reached")
+            marks[REACHED] = self.settings.space.check_reached(commanded, reached)
         state = TrialState.FAIL if failed else TrialState.COMPLETE
         with self.storage.failures(), self.storage.handing_out(self.name):
             return self._ledger.store(state, commanded, marks, number).number

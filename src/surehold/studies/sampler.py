@@ -186,7 +186,7 @@ class Sampler(BaseSampler):
     def n_initial(self, space: SearchSpace) -> int:
         """Return the size of the initial design in a search space."""
         given = self._settings.get("n_initial")
-        return Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given
+        return Optimizer.default_n_initial(space.box or Box.unit(1), space.variables) if given is None else given
 
     @contextmanager
     def optimizing(self, space: SearchSpace, history: History) -> Iterator[Optimizer]:
@@ -220,7 +220,8 @@ class Sampler(BaseSampler):
             raise InputError("every parameter can take one value only; there is nothing to optimize.")
         noise = space.input_noise(self._input_noise)
         surrogate = self._surrogate_for(trials)
-        return Optimizer(space.box, input_noise=noise, surrogate=surrogate, lattice=space.lattice, **self._settings)
+        settings: dict[str, Any] = {**self._settings, "n_initial": self.n_initial(space)}
+        return Optimizer(space.box, input_noise=noise, surrogate=surrogate, lattice=space.lattice, **settings)
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_kept": None, "_lock": None}

@@ -29,9 +29,10 @@ from optuna.distributions import (
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.lattice import Lattice
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
 
 __all__ = ["SearchSpace"]
+_LARGEST: Final = 1e100  # magnitude of a bound; what is computed with larger ones overflows
 
 
 class _Numeric(NamedTuple):
@@ -113,6 +114,11 @@ class SearchSpace:
         self.lattice: Final = None if smooth.all() else Lattice(self._snap, smooth)
 
     @property
+    def variables(self) -> int:
+        """Number of parameters that can vary: a choice is one, however many coordinates it has."""
+        return len(self._numeric) + len(self._choices)
+
+    @property
     def numbers(self) -> Box | None:
         """The box of the parameters that are numbers and can vary: those that input noise is given for."""
         return Box({numeric.name: numeric.bounds() for _, numeric in self._numeric}) if self._numeric else None
@@ -121,12 +127,12 @@ class SearchSpace:
         """Return the point (d,) of the box for parameters that are inside; see `check`."""
         return self.encode_all([parameters])[0]
 
-    def encode_all(self, rows: list[Mapping[str, Any]]) -> NDArray[np.float64]:
-        """Return the points (n, d) of the box for n sets of parameters."""
+    def encode_all(self, rows: list[Mapping[str, Any]], *, anywhere: bool = False) -> NDArray[np.float64]:
+        """Return the points (n, d) of the box for n sets of parameters; `anywhere`: numbers may lie outside of it."""
         X = np.zeros((len(rows), 0 if self.box is None else self.box.dimension))
         for column, numeric in self._numeric:
             values = np.array([row[numeric.name] for row in rows], dtype=np.float64)
-            X[:, column] = numeric.to_coordinate(np.clip(values, numeric.low, numeric.high))
+            X[:, column] = numeric.to_coordinate(values if anywhere else np.clip(values, numeric.low, numeric.high))
         for column, name, distribution in self._choices:
             taken = np.array([int(distribution.to_internal_repr(row[name])) for row in rows], dtype=np.intp)
             X[np.arange(len(rows)), column + taken] = 1.0
@@ -156,7 +162,8 @@ class SearchSpace:
         Raises
         ------
         InputError
-            If one is missing, unknown, of the wrong kind, not finite or outside its range.
+            If one is missing, unknown, of the wrong kind, not finite or outside its range by more than the rounding of
+            single precision.
         """
         if not isinstance(parameters, Mapping):
             raise InputError(f"{what} are {parameters!r}; give {{name: value}} for {', '.join(self.distributions)}.")
@@ -168,6 +175,40 @@ class SearchSpace:
             raise InputError(f"{what} say nothing about {', '.join(missing)}; give a value for each parameter.")
         return {name: _checked(name, d, parameters[name], what) for name, d in self.distributions.items()}
 
+    def check_reached(self, commanded: Mapping[str, Any], reached: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what a trial truly reached: the commanded parameters with those that differ, wherever they lie.
+
+        A robot that strays may leave the ranges, and numbers that count in steps may lie between them.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown, a number is not finite (of a logarithmic one: not positive), or a choice is none.
+        """
+        if not isinstance(reached, Mapping):
+            raise InputError(f"reached is {reached!r}; give {{name: value}} for {', '.join(self.distributions)}.")
+        found = dict(commanded)
+        for name, value in reached.items():
+            if name not in self.distributions:
+                raise unknown_name("parameter", name, self.distributions)
+            distribution = self.distributions[name]
+            if isinstance(distribution, CategoricalDistribution):
+                found[name] = _checked(name, distribution, value, "reached")
+                continue
+            number = _number(name, value, "reached", "a finite number")
+            if abs(number) > _LARGEST or (number <= 0.0 and _numeric(name, distribution).log):
+                raise InputError(f"reached: {name} is {value!r}; give a number that can be reached.")
+            found[name] = round(number) if number.is_integer() and self._is_integer(name) else number
+        return found
+
+    def encodes(self, parameters: Mapping[str, Any]) -> bool:
+        """Tell whether stored parameters name all of this space and have coordinates, inside the box or not."""
+        try:
+            given = {name: parameters[name] for name in self.distributions}
+            return bool(np.isfinite(self.encode_all([self.check_reached(given, given)], anywhere=True)).all())
+        except (InputError, KeyError, TypeError, ValueError):
+            return False
+
     def input_noise(self, noise: InputNoise | None) -> InputNoise | None:
         """Return noise that was given for the numbers of this space as noise of its box, none on choices.
 
@@ -176,6 +217,7 @@ class SearchSpace:
         InputError
             If its names are not those of the numbers, or choices meet noise that is correlated or varies.
         """
+        noise = checked_input_noise(noise, tuple(numeric.name for _, numeric in self._numeric))
         if noise is None or self.box is None or not self._choices:
             return noise
         numbers = self.numbers
@@ -223,12 +265,14 @@ class SearchSpace:
 
 def _distribution(name: str, value: Any) -> BaseDistribution:
     if isinstance(value, BaseDistribution):
-        limits = () if isinstance(value, CategoricalDistribution) else (_numeric(name, value)[1:3])
-        if not np.all(np.isfinite(limits)):
-            raise InputError(f"parameter '{name}' has the bounds {limits}; both must be finite numbers.")
+        for limit in () if isinstance(value, CategoricalDistribution) else _numeric(name, value)[1:3]:
+            if not abs(limit) <= _LARGEST:
+                raise InputError(
+                    f"parameter '{name}' has the bound {str(limit)[:20]}; bounds are finite numbers up to {_LARGEST:g}."
+                )
         return value
     box = Box({name: value})
-    return FloatDistribution(float(box.lower[0]), float(box.upper[0]))
+    return _distribution(name, FloatDistribution(float(box.lower[0]), float(box.upper[0])))
 
 
 def _numeric(name: str, distribution: BaseDistribution) -> _Numeric:
@@ -252,6 +296,16 @@ def _holds(distribution: BaseDistribution, value: Any) -> bool:
         return False
 
 
+def _number(name: str, value: Any, what: str, wanted: str) -> float:
+    try:
+        number = float("nan") if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = float("nan")
+    if not np.isfinite(number):
+        raise InputError(f"{what}: {name} is {str(value)[:60]!r}; give {wanted}.")
+    return number
+
+
 def _checked(name: str, distribution: BaseDistribution, value: Any, what: str) -> Any:
     if isinstance(distribution, CategoricalDistribution):
         for choice in distribution.choices:
@@ -262,15 +316,8 @@ def _checked(name: str, distribution: BaseDistribution, value: Any, what: str) -
             return texts[value]
         raise unknown_name(f"choice for '{name}'", value, texts)
     low, high, step, _ = _numeric(name, distribution)[1:]
-    try:
-        if isinstance(value, bool):
-            raise TypeError
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what}: {name} is {value!r}; give a number between {low:g} and {high:g}.") from None
-    if not np.isfinite(number):
-        raise InputError(f"{what}: {name} is {value!r}; give a finite number between {low:g} and {high:g}.")
-    slack = 1e-9 * (high - low)
+    number = _number(name, value, what, f"a finite number between {low:g} and {high:g}")
+    slack = 1e-9 * (high - low) + min(2.0**-23 * max(abs(low), abs(high)), 1e-3 * (high - low))  # as in Box.rounding
     if not low - slack <= number <= high + slack:
         raise InputError(f"{what}: {name} = {number:g} lies outside its range from {low:g} to {high:g}.")
     number = min(max(number, low), high)

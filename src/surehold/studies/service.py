@@ -4,7 +4,6 @@ Every request carries the token (`Authorization: Bearer TOKEN`). What is answere
 the caller are answered with 4xx and `{"detail": what is wrong and what to do}`; only a storage that is away with 503.
 """
 
-import hmac
 import html
 import secrets
 import socket
@@ -16,24 +15,22 @@ from typing import Annotated, Any, Final
 from fastapi import Depends, FastAPI, HTTPException, Path, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse
-from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from fastapi.security import HTTPBearer
 
 from surehold import __version__
 from surehold.errors import InputError, SureholdError
 from surehold.studies import service_messages as wire
 from surehold.studies.ledger import AnswerRefused, UnknownTrial
 from surehold.studies.robot import NothingToAsk, RobotStudy
+from surehold.studies.service_guard import PATIENCE, Guard, Impatience
 from surehold.studies.status import rows, status
 from surehold.studies.storage import StorageFailure
 
-__all__ = ["HOST", "LARGEST_BODY", "Server", "listening", "new_token", "service"]
+__all__ = ["HOST", "Server", "listening", "new_token", "service"]
 
 HOST: Final = "127.0.0.1"
-LARGEST_BODY: Final = 64 * 1024  # bytes
-_DROPPED: Final = 64 * 1024 * 1024  # bytes that are read of a body that is too large
 
-_bearer = HTTPBearer(auto_error=False, description="The token that `surehold study serve` printed.")
+_bearer = HTTPBearer(auto_error=False, description="The token that `surehold study serve` printed.")  # for the page
 
 
 def new_token() -> str:
@@ -48,12 +45,26 @@ class Server:
         self._listener = listener
         self.address: Final = f"http://{HOST}:{listener.getsockname()[1]}"
 
-    def run(self, application: FastAPI) -> None:
-        """Answer requests until Ctrl-C or SIGTERM."""
+    def run(self, application: FastAPI, patience: float = PATIENCE) -> None:
+        """Answer requests until Ctrl-C or SIGTERM; callers that take longer than `patience` seconds are dropped."""
         import uvicorn
 
-        configuration = uvicorn.Config(application, log_level="warning", access_log=False)
-        uvicorn.Server(configuration).run(sockets=[self._listener])
+        impatience = Impatience(patience)
+
+        async def look() -> None:
+            impatience(server.server_state.connections)
+
+        configuration = uvicorn.Config(
+            application,
+            http="h11",
+            ws="none",
+            log_level="warning",
+            access_log=False,
+            callback_notify=look,
+            timeout_notify=min(1, patience),  # type: ignore[arg-type]
+        )
+        server = uvicorn.Server(configuration)
+        server.run(sockets=[self._listener])
 
 
 @contextmanager
@@ -67,7 +78,7 @@ def listening(port: int) -> Iterator[Server]:
         yield Server(listener)
 
 
-def service(study: RobotStudy, token: str) -> FastAPI:
+def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAPI:
     """Return the application that answers for one study.
 
     Raises
@@ -78,17 +89,12 @@ def service(study: RobotStudy, token: str) -> FastAPI:
     if len(token) < 16 or not token.isascii() or not token.isprintable() or " " in token:
         raise InputError("the token must be 16 printable ASCII characters or more, without spaces.")
 
-    def authorized(given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]) -> None:
-        if given is None or not hmac.compare_digest(given.credentials.encode(), token.encode()):
-            message = "the token is missing or wrong; send the header 'Authorization: Bearer TOKEN'."
-            raise HTTPException(401, message, {"WWW-Authenticate": "Bearer"})
-
     def served(name: Annotated[str, Path(json_schema_extra={"enum": [study.name]})]) -> None:
         if name != study.name:
             raise HTTPException(404, f"study {name[:100]!r} is not served here; this is '{study.name}'.")
 
     problems: dict[int | str, dict[str, Any]] = {
-        code: {"model": wire.Problem} for code in (400, 401, 404, 409, 413, 422, 503)
+        code: {"model": wire.Problem} for code in (400, 401, 404, 408, 409, 413, 422, 503)
     }
     app = FastAPI(
         title=f"surehold study {study.name}",
@@ -99,10 +105,10 @@ def service(study: RobotStudy, token: str) -> FastAPI:
         redirect_slashes=False,
         responses=problems,
     )
-    app.add_middleware(_SmallBodies)
+    app.add_middleware(Guard, token=token, patience=patience)
     _say_what_is_wrong(app)
     writing = threading.Lock()  # one recommendation is written at a time
-    protected: dict[str, Any] = {"dependencies": [Depends(authorized), Depends(served)]}
+    protected: dict[str, Any] = {"dependencies": [Depends(_bearer), Depends(served)]}  # Guard has checked the token
 
     @app.get("/", response_class=HTMLResponse, include_in_schema=False)
     def page() -> str:
@@ -193,36 +199,6 @@ def _say_what_is_wrong(app: FastAPI) -> None:
             (NothingToAsk, 409),
         )
         return answer(next((code for kind, code in codes if isinstance(error, kind)), 409), str(error))
-
-
-class _SmallBodies:
-    """Reads a request's body before anything else does, and answers 413 where it is too large."""
-
-    def __init__(self, app: ASGIApp):
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-        messages: list[Message] = []
-        size, more = 0, True
-        while more:
-            message = await receive()
-            size += len(message.get("body", b""))
-            if size <= LARGEST_BODY:
-                messages.append(message)
-            # What is too large is read all the same, and dropped: a caller that is still sending hears no answer.
-            more = message["type"] == "http.request" and message.get("more_body", False) and size < _DROPPED
-        if size > LARGEST_BODY:
-            detail = f"the body is larger than {LARGEST_BODY} bytes."
-            await JSONResponse({"detail": detail}, 413, {"Connection": "close"})(scope, receive, send)
-            return
-
-        async def replay() -> Message:
-            return messages.pop(0) if messages else await receive()
-
-        await self._app(scope, replay, send)
 
 
 def _page(app: FastAPI) -> str:

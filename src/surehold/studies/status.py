@@ -8,6 +8,7 @@ from typing import Any
 
 from optuna.trial import FrozenTrial, TrialState
 
+from surehold.studies.csv_cells import written_cell
 from surehold.studies.history import REACHED, parameters_of
 from surehold.studies.ledger import NOTE, VETOED, holder_of
 from surehold.studies.robot import RobotStudy
@@ -71,13 +72,13 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
 
 
 def to_csv(study: RobotStudy) -> str:
-    """Return the trials as CSV with a header; an empty field is nothing."""
+    """Return the trials as CSV with a header; an empty field is nothing, texts as in `csv_cells.written_cell`."""
     names = list(study.settings.space.distributions)
     columns = ["id", "state", "value", *names, *(f"reached_{n}" for n in names), "begun", "finished", "worker", "note"]
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows(study))
+    writer.writerows({column: written_cell(value) for column, value in row.items()} for row in rows(study))
     return text.getvalue()
 
 

@@ -12,6 +12,7 @@ The locks are the operating system's (files) or the server's (PostgreSQL): they 
 however it ends.
 """
 
+import json
 import os
 import re
 import threading
@@ -20,12 +21,12 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 from optuna import logging
 from optuna.exceptions import DuplicatedStudyError, StorageInternalError
 from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, RDBStorage, get_storage
-from optuna.storages.journal import JournalFileBackend
+from optuna.storages.journal import BaseJournalBackend, JournalFileBackend
 
 from surehold.errors import InputError
 from surehold.store.locks import file_lock, locked
@@ -160,8 +161,8 @@ class _JournalLock:
     """The lock of a journal's writers, in the form that Optuna asks for.
 
     Optuna's own locks are files that outlive a killed process; others then wait half a minute. A writer that was killed
-    or ran out of disk in the middle of a line leaves half a line behind, which was never acknowledged and would make
-    the next line unreadable: it is cut off, and said.
+    or ran out of disk in the middle of a line, or a power cut, leaves a line behind that cannot be read; one more line
+    behind it would make the whole journal unreadable. So it is cut off before anything is appended, and said.
     """
 
     def __init__(self, journal: Path):
@@ -170,24 +171,73 @@ class _JournalLock:
 
     def acquire(self) -> bool:
         self._lock.acquire()
-        self._mend()
+        try:
+            self._mend()
+        except BaseException:
+            self._lock.release()
+            raise
         return True
 
     def release(self) -> None:
         self._lock.release()
 
+    def mend(self) -> None:
+        """Cut off a damaged last line, if there is one; a line that is just being written is waited for."""
+        with open(self._journal, "rb") as journal:
+            end = journal.seek(0, os.SEEK_END)
+            whole = not end or _is_operation(_line_before(journal, end))
+        if not whole:
+            self.acquire()
+            self.release()
+
     def _mend(self) -> None:
         with open(self._journal, "rb+") as journal:
-            size = journal.seek(0, os.SEEK_END)
-            if size == 0:
+            size = end = journal.seek(0, os.SEEK_END)
+            last = b""
+            while end and not _is_operation(last := _line_before(journal, end)):
+                end -= len(last)
+            if end == size or (end == 0 and last.endswith(b"\n")):  # whole, or no journal at all: somebody else's file
                 return
-            journal.seek(-1, os.SEEK_END)
-            if journal.read(1) == b"\n":
-                return
-            journal.seek(0)
-            end = journal.read().rfind(b"\n") + 1
+            journal.seek(end)
+            lost = journal.read(100)
             journal.truncate(end)
-        _log.warning(f"{self._journal}: an unfinished line of {size - end} bytes, never acknowledged, was cut off.")
+        _log.warning(f"{self._journal}: damaged last line cut off, {size - end} bytes that start with {lost!r}.")
+
+
+class _Journal(BaseJournalBackend):
+    """A journal file that is mended before it is read: not every kind of damage is passed over by Optuna's reader."""
+
+    def __init__(self, path: Path):
+        self._lock = _JournalLock(path)
+        self._file = JournalFileBackend(str(path), lock_obj=self._lock)  # type: ignore[arg-type]
+
+    def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
+        self._lock.mend()
+        return self._file.read_logs(log_number_from)
+
+    def append_logs(self, logs: list[dict[str, Any]]) -> None:
+        self._file.append_logs(logs)
+
+
+def _line_before(file: BinaryIO, end: int) -> bytes:
+    """Return the line of a file that ends at the byte `end`, its newline included where it has one."""
+    length = 4096
+    while True:
+        start = max(0, end - length)
+        file.seek(start)
+        block = file.read(end - start)
+        newline = block.rfind(b"\n", 0, -1)
+        if newline >= 0 or start == 0:
+            return block[newline + 1 :]
+        length *= 2
+
+
+def _is_operation(line: bytes) -> bool:
+    """Tell whether a line of a journal can be read."""
+    try:
+        return line.endswith(b"\n") and "op_code" in json.loads(line)
+    except (ValueError, TypeError, RecursionError):
+        return False
 
 
 def _journal(path: Path, create: bool) -> Storage:
@@ -202,14 +252,13 @@ def _journal(path: Path, create: bool) -> Storage:
             start = journal.read(2)
         if not b'{"'.startswith(start):  # before anything is mended in a file that is somebody else's
             raise InputError(f"storage {str(path)!r} cannot be read: it is no journal, but some other file.")
-        lock = _JournalLock(path)
-        lock.acquire()
-        lock.release()
     except OSError as error:
         raise InputError(f"storage {str(path)!r} cannot be written: {error.strerror or error}.") from None
     try:
-        backend = JournalStorage(JournalFileBackend(str(path), lock_obj=lock))  # type: ignore[arg-type]
-    except (ValueError, KeyError, AssertionError, TypeError, AttributeError) as error:
+        backend = JournalStorage(_Journal(path))
+    except OSError as error:
+        raise InputError(f"storage {str(path)!r} cannot be used: {error.strerror or error}.") from None
+    except (ValueError, KeyError, AssertionError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"storage {str(path)!r} cannot be read: no journal, damaged, or of a newer version of Optuna ({error})."
         ) from None

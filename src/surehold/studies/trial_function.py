@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from surehold.errors import InputError
-from surehold.optimization.maximization import evaluate
+from surehold.optimization.evaluation import evaluate
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
 
@@ -31,11 +31,12 @@ def trial_function(f: Callable[[Any], Any], space: SearchSpace) -> Callable[[Map
     choices = any(isinstance(v, str) or v is None for v in _examples(space))
 
     def attempt(parameters: Mapping[str, Any]) -> Outcome:
-        if choices:
-            value, failure = evaluate(lambda _: f(dict(parameters)), np.empty(0))
-        else:
-            value, failure = evaluate(f, np.array([parameters[n] for n in space.distributions], dtype=np.float64))
-        return Outcome(value, failure)
+        try:
+            if choices:
+                return Outcome(*evaluate(lambda _: f(dict(parameters)), np.empty(0)))
+            return Outcome(*evaluate(f, np.array([parameters[n] for n in space.distributions], dtype=np.float64)))
+        except InputError as error:  # cannot be called at all
+            return Outcome(np.nan, str(error))
 
     return attempt
 

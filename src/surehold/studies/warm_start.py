@@ -13,6 +13,7 @@ from optuna.study import Study
 from optuna.trial import TrialState
 
 from surehold.errors import InputError
+from surehold.studies.csv_cells import cell_text
 from surehold.studies.history import REACHED
 from surehold.studies.ledger import checked_value
 from surehold.studies.robot import RobotStudy
@@ -66,9 +67,13 @@ def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> 
         state = (row.get("state") or "").strip().lower()
         if state in _UNFINISHED:
             continue
-        told = (row[value] or "").strip()
-        reached = {name: row[f"reached_{name}"] for name in names if (row.get(f"reached_{name}") or "").strip()}
-        parameters = {name: (row[column] or "").strip() for name, column in names.items()}
+        told = cell_text((row[value] or "").strip())
+        reached = {
+            name: cell_text(row[f"reached_{name}"].strip())
+            for name in names
+            if (row.get(f"reached_{name}") or "").strip()
+        }
+        parameters = {name: cell_text((row[column] or "").strip()) for name, column in names.items()}
         failed = state in _FAILED or not told
         where = f"{Path(path).name}, line {reader.line_num}"
         found.append(FormerTrial(where, parameters, None if failed else told, failed, reached))
@@ -112,7 +117,7 @@ def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: boo
         try:
             checked_value(trial.value, trial.failed)
             commanded = study.settings.space.check(trial.parameters)
-            study.settings.space.check(commanded | dict(trial.reached), "reached")
+            study.settings.space.check_reached(commanded, trial.reached)
             good.append(trial)
         except InputError as error:
             if not skip_bad:

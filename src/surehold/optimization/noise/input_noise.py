@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 
-__all__ = ["InputNoise"]
+__all__ = ["InputNoise", "checked_input_noise"]
 
 
 class InputNoise:
@@ -97,6 +97,23 @@ class InputNoise:
         noise._deviations = noise._covariance = noise._function = None
         noise._unit = value
         noise.bounded = False
+        return noise
+
+    def to_json(self) -> dict[str, Any]:
+        """Return constant noise as plain data, for `from_json`; raises InputError for noise that varies."""
+        if self._function is not None:
+            raise InputError(f"{self!r} is a function, which plain data cannot hold; give constant noise.")
+        covariance = None if self._covariance is None else self._covariance.tolist()
+        data = {"standard_deviations": self._deviations, "covariance": covariance, "unit": self._unit}
+        return {name: value for name, value in data.items() if value is not None} | {"bounded": self.bounded}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "InputNoise":
+        """Return the noise that `to_json` described."""
+        if "unit" in data:
+            return cls.unit(data["unit"])
+        noise = cls(data.get("standard_deviations"), covariance=data.get("covariance"))
+        noise.bounded = bool(data["bounded"])
         return noise
 
     def unit_covariance(self, box: Box, x: ArrayLike | None = None) -> NDArray[np.float64]:
@@ -189,6 +206,22 @@ class InputNoise:
         if self._covariance is not None:
             return f"InputNoise(covariance={self._covariance.tolist()})"
         return f"InputNoise({self._deviations})"
+
+
+def checked_input_noise(value: Any, names: tuple[str, ...]) -> InputNoise | None:
+    """Return input noise as it was given; raises InputError if it is none. `names` are those of the variables."""
+    if value is None or isinstance(value, InputNoise):
+        return value
+    shown = f"input_noise is {' '.join(repr(value).split())}"
+    if isinstance(value, Mapping):
+        raise InputError(f"{shown}; give sh.InputNoise({dict(value)!r}).")
+    if np.ndim(value) == 0 and isinstance(value, (int, float, np.number)):
+        named = ", ".join(f"{name!r}: {value:g}" for name in names)
+        raise InputError(
+            f"{shown}, and it does not say of what: give sh.InputNoise.unit({value:g}) for that share of every "
+            f"variable's range, or sh.InputNoise({{{named}}}) for standard deviations in the variables' own units."
+        )
+    raise InputError(f"{shown}; give sh.InputNoise({{name: standard deviation}}) for {', '.join(names)}, or None.")
 
 
 def root_of(covariance: NDArray[np.float64]) -> NDArray[np.float64]:

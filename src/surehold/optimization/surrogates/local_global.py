@@ -340,7 +340,8 @@ class LocalGlobalProcess:
             prior_deviation=np.concatenate([prior.prior_deviation[:d], prior.prior_deviation, np.ones(d)]),
         )
         theta = plain.hyperparameters.theta[0]
-        start = np.concatenate([theta[:d], theta[:d] - log(4.0), theta[d : d + 1], X[int(np.argmax(y))]])
+        best = np.clip(X[int(np.argmax(y))], 0.0, 1.0)  # a trial may have reached a place outside of the box
+        start = np.concatenate([theta[:d], theta[:d] - log(4.0), theta[d : d + 1], best])
         widths = np.append(np.full(2 * d + 1, 1.0), np.full(d, 0.2))
         samples = slice_sample(
             log_posterior, evidence, start, rng, keep=PARTICLES, burn_in=LOCAL_GLOBAL_BURN_IN, widths=widths

@@ -1,0 +1,112 @@
+"""Trying inputs: a user's function called here, one trial after the other, or in processes of its own."""
+
+from collections.abc import Callable, Iterator
+from time import perf_counter
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError, SureholdError
+from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.points import numbers_of
+from surehold.optimization.trials import AskedTrial
+
+__all__ = ["Evaluation", "evaluate", "in_processes", "one_by_one"]
+
+
+class Evaluation(NamedTuple):
+    """What came of a trial."""
+
+    asked: AskedTrial
+    y: float
+    """NaN where it failed"""
+    failure: str
+    """why it failed, empty where it did not"""
+    seconds: float
+    """time that asking took"""
+
+
+def evaluate(f: Callable[[NDArray[np.float64]], Any], x: NDArray[np.float64]) -> tuple[float, str]:
+    """Return f(x) and an empty text, or NaN and why there is no finite number.
+
+    Raises
+    ------
+    InputError
+        If f cannot be called with one array at all: no other x would be better.
+    """
+    try:
+        value = f(x.copy())
+    except Exception as error:  # whatever a user's function raises is the trial's outcome, not the run's end
+        if isinstance(error, TypeError) and _in_the_call(error.__traceback__):
+            raise InputError(f"the function cannot be called with one array x of shape {x.shape}: {error}.") from None
+        return np.nan, f"{type(error).__name__}: {error}"
+    if value is None:
+        return np.nan, "returned None instead of a number; does it lack a return"
+    try:
+        array = numbers_of(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        return np.nan, f"{type(error).__name__}: {error}"
+    if array.size != 1:
+        return np.nan, f"returned an array of shape {array.shape} instead of one number"
+    if not np.isfinite(array).all():
+        return np.nan, f"returned {float(array.reshape(()))}"
+    return float(array.reshape(())), ""
+
+
+def _in_the_call(traceback: TracebackType | None) -> bool:
+    """Tell whether an error was raised before a line of the user's function ran."""
+    while traceback is not None and traceback.tb_next is not None:
+        traceback = traceback.tb_next
+    name = "" if traceback is None else str(traceback.tb_frame.f_globals.get("__name__", ""))
+    return name.partition(".")[0] == "surehold"
+
+
+def one_by_one(optimizer: Optimizer, f: Callable[..., Any], n_trials: int) -> Iterator[Evaluation]:
+    """Ask and try `n_trials` times; whoever iterates tells."""
+    for _ in range(n_trials):
+        started = perf_counter()
+        asked = optimizer.ask_trial()
+        seconds = perf_counter() - started
+        yield Evaluation(asked, *evaluate(f, asked.x), seconds)
+
+
+def in_processes(optimizer: Optimizer, f: Callable[..., Any], n_trials: int, n_jobs: int) -> Iterator[Evaluation]:
+    """Ask and try `n_trials` times, up to `n_jobs` at once, each as soon as another has finished.
+
+    Whoever iterates tells. Where the iterator is closed early, what still runs is ended.
+
+    Raises
+    ------
+    SureholdError
+        If f cannot be sent to a process, or a process dies.
+    """
+    from concurrent.futures import FIRST_COMPLETED, Future, wait
+    from concurrent.futures.process import BrokenProcessPool
+    from pickle import PicklingError
+
+    from joblib.externals.loky import ProcessPoolExecutor
+
+    pool = ProcessPoolExecutor(max_workers=n_jobs)
+    running: dict[Future[tuple[float, str]], tuple[AskedTrial, float]] = {}
+    begun = 0
+    try:
+        while begun < n_trials or running:
+            while begun < n_trials and len(running) < n_jobs:
+                started = perf_counter()
+                asked = optimizer.ask_trial()
+                seconds = perf_counter() - started
+                running[pool.submit(evaluate, f, asked.x)] = (asked, seconds)
+                begun += 1
+            done = min(wait(running, return_when=FIRST_COMPLETED).done, key=lambda future: running[future][0].number)
+            asked, seconds = running.pop(done)
+            yield Evaluation(asked, *done.result(), seconds)
+    except PicklingError as error:
+        raise SureholdError(f"the function cannot be sent to a process: {error}. Say n_jobs=1.") from None
+    except BrokenProcessPool as error:
+        raise SureholdError(f"a process that made a trial has died: {error}. Say n_jobs=1 to see why.") from None
+    finally:
+        for asked, _ in running.values():
+            optimizer.forget(asked)
+        pool.shutdown(wait=True, kill_workers=bool(running))

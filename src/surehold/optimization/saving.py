@@ -1,0 +1,127 @@
+"""An optimizer as a JSON file: its settings and its trials. Inputs are stored in the unit cube, to the last bit."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from surehold.errors import InputError
+from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.box import Box
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.trials import Trials
+
+__all__ = ["read", "write"]
+
+_FORMAT: Final = "surehold optimizer"
+_VERSION: Final = 1
+_OBJECT: Final = "object that is not stored"
+
+
+def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], trials: Trials) -> None:
+    """Write settings, arguments of `Optimizer`, and trials; a file that is there is replaced as a whole.
+
+    Settings that are objects (a surrogate, a lattice, noise that varies) are named only. Raises InputError where the
+    file cannot be written.
+    """
+    data = {
+        "format": _FORMAT,
+        "version": _VERSION,
+        "box": {name: pair for name, *pair in zip(box.names, box.lower.tolist(), box.upper.tolist(), strict=True)},
+        "settings": {name: _plain(value) for name, value in settings.items()},
+        "trials": [
+            {
+                "number": int(number),
+                "commanded": commanded.tolist(),
+                "reached": reached.tolist(),
+                "value": None if np.isnan(value) else float(value),
+            }
+            for number, commanded, reached, value in zip(
+                trials.numbers, trials.commanded, trials.reached, trials.values, strict=True
+            )
+        ],
+        "pending": [
+            {"number": number, "commanded": u.tolist()}
+            for number, u in zip(trials.pending_numbers, trials.pending, strict=True)
+        ],
+    }
+    text = json.dumps(data, indent=1, allow_nan=False) + "\n"
+    unfinished = Path(f"{os.fspath(path)}.{os.getpid()}.part")
+    try:
+        unfinished.write_text(text, encoding="utf-8")
+        unfinished.replace(path)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise InputError(f"file {os.fspath(path)!r} cannot be written: {error.strerror or error}.") from None
+
+
+def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, dict[str, Any], Trials]:
+    """Return the box, the settings, those `given` in place of stored ones, and the trials that a file holds.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, was not written by `write` or by a newer version, or names an object that is not
+        given.
+    """
+    shown = repr(os.fspath(path))
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"file {shown} cannot be read: {error.strerror or error}.") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"file {shown} is no JSON: {error}.") from None
+    if not isinstance(data, dict) or data.get("format") != _FORMAT:
+        raise InputError(f"file {shown} holds no optimizer; give one that Optimizer.save has written.")
+    if data.get("version") != _VERSION:
+        raise InputError(f"file {shown} has the format {data.get('version')!r}, this version reads {_VERSION}.")
+    try:
+        box = Box(data["box"])
+        settings = {name: _restored(name, value) for name, value in {**data["settings"], **given}.items()}
+        told, pending = data["trials"], data["pending"]
+        trials = Trials(box)
+        trials.restore_cube(
+            [trial["commanded"] for trial in told],
+            [np.nan if trial["value"] is None else trial["value"] for trial in told],
+            [trial["reached"] for trial in told],
+            [trial["commanded"] for trial in pending],
+            [trial["number"] for trial in [*told, *pending]],
+        )
+        inputs = np.concatenate([trials.commanded, trials.pending])
+        if not (np.isfinite(trials.reached).all() and np.all((inputs >= 0.0) & (inputs <= 1.0))):
+            raise ValueError("an input lies outside of the box")
+    except InputError:
+        raise
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise InputError(f"file {shown} is damaged: {type(error).__name__}: {error}.") from None
+    return box, settings, trials
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, InputNoise) and not value.varies:
+        return {"input noise": value.to_json()}
+    if isinstance(value, Risk):
+        return {"risk": asdict(value)}
+    if isinstance(value, Mapping):
+        return {name: _plain(entry) for name, entry in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    return value if value is None or isinstance(value, (str, bool, int, float)) else {_OBJECT: repr(value)}
+
+
+def _restored(name: str, value: Any) -> Any:
+    if isinstance(value, dict) and _OBJECT in value:
+        raise InputError(
+            f"{name} was {value[_OBJECT]}, which a file does not hold; say Optimizer.load(path, {name}=...)."
+        )
+    if isinstance(value, dict) and "input noise" in value:
+        return InputNoise.from_json(value["input noise"])
+    if isinstance(value, dict) and "risk" in value:
+        return Risk(**value["risk"])
+    return value

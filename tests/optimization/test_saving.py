@@ -1,0 +1,88 @@
+import json
+
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.box import Box
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+
+BOX = Box({"a": (-0.3, 0.7), "b": (3.0, 7.1)})
+
+TRIAL = {"number": 0, "commanded": [0.1, 0.2], "reached": [0.1, 0.2], "value": 1.0}
+
+
+def used(n=8, **settings):
+    optimizer = Optimizer(BOX, n_initial=5, seed=4, **settings)
+    for i in range(n):
+        x = optimizer.ask()
+        optimizer.tell(x, None if i == 3 else -float((x**2).sum()), failed=i == 3, reached=x + 0.3 if i == 1 else None)
+    optimizer.forget(optimizer.ask(2)[0])
+    return optimizer
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"direction": "minimize"},
+        {"input_noise": InputNoise({"a": 0.1, "b": 0.2}), "risk": "mean-std"},
+        {"input_noise": InputNoise.uniform({"a": 0.1, "b": 0.0})},
+        {"input_noise": InputNoise(covariance=[[0.01, 0.005], [0.005, 0.04]]), "criterion": "uei"},
+        {"input_noise": InputNoise.unit(0.05), "risk": Risk("cvar", alpha=0.2)},
+        {"fixed": {"b": np.float64(4.0)}, "initial_points": [{"a": 0.5, "b": 4.0}], "output_range": (-60.0, 0.0)},
+    ],
+    ids=str,
+)
+def test_a_loaded_optimizer_goes_on_as_the_saved_one(tmp_path, settings):
+    saved = used(**settings)
+    saved.save(tmp_path / "run.json")
+    loaded = Optimizer.load(tmp_path / "run.json")
+    for name in ("X", "y", "reached", "pending"):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(saved, name))
+    assert loaded.direction == saved.direction
+    assert np.array_equal(loaded.recommend().x, saved.recommend().x)
+    assert np.array_equal(loaded.ask(2), saved.ask(2))
+
+
+def test_before_any_trial(tmp_path):
+    Optimizer(BOX, seed=2).save(tmp_path / "run.json")
+    assert np.array_equal(Optimizer.load(tmp_path / "run.json").ask(), Optimizer(BOX, seed=2).ask())
+
+
+def test_what_a_file_cannot_hold_is_asked_for(tmp_path):
+    process = GaussianProcess(kernel="matern32")
+    saved = used(surrogate=process)
+    saved.save(tmp_path / "run.json")
+    with pytest.raises(InputError, match=r"surrogate was .*GaussianProcess.*surrogate=\.\.\."):
+        Optimizer.load(tmp_path / "run.json")
+    assert np.array_equal(Optimizer.load(tmp_path / "run.json", surrogate=process).ask(), saved.ask())
+
+
+def test_bad_files(tmp_path):
+    good = tmp_path / "good.json"
+    used(0).save(good)
+    data = json.loads(good.read_text())
+    cases = {
+        "is no JSON": "{",
+        "holds no optimizer": "[1, 2]",
+        "format 99": json.dumps(data | {"version": 99}),
+        "is damaged": json.dumps({name: data[name] for name in data if name != "trials"}),
+        "damaged: ValueError": json.dumps(data | {"trials": [TRIAL | {"commanded": [0.1]}]}),
+        "damaged: TypeError|damaged: ValueError": json.dumps(data | {"trials": [TRIAL | {"commanded": [{}, 1.0]}]}),
+        "outside of the box": json.dumps(data | {"trials": [TRIAL | {"commanded": [0.1, 1.1]}]}),
+        "different whole numbers": json.dumps(data | {"trials": [TRIAL, TRIAL]}),
+    }
+    for words, text in cases.items():
+        bad = tmp_path / "bad.json"
+        bad.write_text(text)
+        with pytest.raises(InputError, match=words):
+            Optimizer.load(bad)
+    with pytest.raises(InputError, match="cannot be read"):
+        Optimizer.load(tmp_path / "none.json")
+    with pytest.raises(InputError, match="cannot be written"):
+        used(0).save(tmp_path / "no" / "folder.json")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.json", "good.json"]
