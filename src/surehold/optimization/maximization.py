@@ -238,7 +238,8 @@ def minimize(f: Callable[[NDArray[np.float64]], float], box: Box, n_trials: int 
     >>> bool(abs(result.recommendation.x[0] - 0.5) < 0.01), bool(result.recommendation.mean < 0.001)
     (True, True)
     """
-    return maximize(f, box, n_trials, **(settings | {"direction": "minimize"}))
+    turned: dict[str, Any] = {**settings, "direction": "minimize"}
+    return maximize(f, box, n_trials, **turned)
 
 
 def _count(name: str, value: int) -> int:

@@ -7,7 +7,7 @@ Legend
 
 import os
 from collections.abc import Mapping
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -361,6 +361,12 @@ class Optimizer:
         if n is None:
             return self._ask_one(number).x
         return np.array([trial.x for trial in self._ask(n, number)])
+
+    @overload
+    def ask_trial(self, n: None = None) -> AskedTrial: ...
+
+    @overload
+    def ask_trial(self, n: int) -> list[AskedTrial]: ...
 
     def ask_trial(self, n: int | None = None) -> AskedTrial | list[AskedTrial]:
         """Ask as `ask` does, for trials that know their numbers: `tell` takes one in place of x.

@@ -44,7 +44,7 @@ def points_of(x: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
             raise InputError(f"point {_short(x)} {_why(error)}; give {wanted}.") from None
     if points.ndim == 0 or points.shape[-1] != len(names):
         raise InputError(
-            f"point of shape {points.shape} does not fit; the last axis must have {len(names)} "
+            f"points of shape {points.shape} do not fit; the last axis must have {len(names)} "
             f"entries ({', '.join(names)})."
         )
     return points

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
+from surehold.optimization.points import points_of
 
 __all__ = ["Optimum", "Problem", "checked_points"]
 
@@ -38,19 +39,14 @@ class Problem(Protocol):
 
 
 def checked_points(x: ArrayLike, box: Box) -> tuple[NDArray[np.float64], bool]:
-    """Return x as points (n, d), and whether it was a single point (d,).
+    """Return x as points (n, d), and whether it was a single point (d,); read by names where x carries some.
 
     Raises
     ------
     InputError
         If x is not numeric or has neither shape (d,) nor (n, d).
     """
-    try:
-        points = np.asarray(x, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(
-            f"point {x!r} is not numeric; give {box.dimension} numbers ({', '.join(box.names)})."
-        ) from None
+    points = points_of(x, box.names)
     if points.ndim not in (1, 2) or points.shape[-1] != box.dimension:
         raise InputError(
             f"points of shape {points.shape} do not fit; give ({box.dimension},) or (n, {box.dimension}), "
