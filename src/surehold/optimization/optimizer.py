@@ -163,7 +163,7 @@ class Optimizer:
         if input_noise is not None:
             input_noise.warn_if_larger_than(box)
         many = name.scale == "robust" or risk.name != "mean"
-        rule = quadrature or ("quasi_monte_carlo" if many else "unscented")
+        rule = ("quasi_monte_carlo" if many else "unscented") if quadrature is None else quadrature
         self._goal = Goal(
             criterion=name,
             accurate=Perturbations.of(input_noise, box, rule, border, k=k),
