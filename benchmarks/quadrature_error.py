@@ -21,7 +21,7 @@ import surehold as sh
 from benchmarks.robust_regret import BUDGETS, problem_named
 from surehold.errors import InputError
 from surehold.optimization.noise import quadratures
-from surehold.optimization.noise.input_noise import root_of
+from surehold.optimization.noise.kinds import root_of
 from surehold.optimization.surrogates.gaussian_process.closed_form import closed_form
 from surehold.optimization.surrogates.gaussian_process.kernels import cross_correlation
 from surehold.problems.robust import ROBUST, RobustProblem

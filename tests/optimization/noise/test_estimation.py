@@ -1,3 +1,5 @@
+import warnings
+
 import numpy as np
 import pytest
 
@@ -51,3 +53,65 @@ def test_equal_repeats_show_no_noise():
     places = np.repeat(np.random.default_rng(0).random((4, 2)), 3, axis=0)
     with pytest.raises(InputError, match="no sign"):
         noise_from_repeats(places, places[:, 0])
+
+
+MIXED = sh.Box({"gap_m": (0.0, 1e-3), "T_K": (300.0, 1300.0)})
+
+
+def reports(strays, box=MIXED, seed=0):
+    """Return commanded inputs in the unit cube and reached ones that stray by (n, d) in the box's units."""
+    U = np.random.default_rng(seed).random(strays.shape)
+    return U, U + strays / box.widths
+
+
+def test_twenty_five_reports_of_meters_and_kelvin():
+    S = np.array([[1e-10, 1e-4], [1e-4, 400.0]])
+    strays = np.random.default_rng(1).multivariate_normal([0.0, 0.0], S, 25, method="cholesky")
+    optimizer = sh.Optimizer(MIXED, seed=0)
+    for _, stray in zip(range(25), strays, strict=True):
+        x = (
+            optimizer.ask()
+            if len(optimizer.y) < 10
+            else MIXED.from_unit(np.random.default_rng(len(optimizer.y)).random(2))
+        )
+        x = np.clip(x, MIXED.lower + 0.1 * MIXED.widths, MIXED.upper - 0.1 * MIXED.widths)
+        optimizer.tell(x, float(x[1]), reached=x + stray)
+    found = optimizer.estimate_input_noise().unit_covariance(MIXED) * np.outer(MIXED.widths, MIXED.widths)
+    np.testing.assert_allclose(found, strays.T @ strays / 25, rtol=1e-6)
+
+
+def test_an_exact_variable_among_many_reports_stays_exact():
+    strays = np.random.default_rng(2).normal(0.0, 20.0, (30, 2)) * [0.0, 1.0]
+    found = noise_from_reached(MIXED, *reports(strays)).unit_covariance(MIXED)
+    assert found[0, 0] == found[0, 1] == 0.0
+    assert found[1, 1] == pytest.approx(np.mean(strays[:, 1] ** 2) / 1e6)
+
+
+def test_variables_that_stray_in_step_keep_their_deviations():
+    strays = np.random.default_rng(3).normal(0.0, 1.0, (30, 1)) * [1e-5, 20.0]
+    found = noise_from_reached(MIXED, *reports(strays)).unit_covariance(MIXED)
+    np.testing.assert_allclose(np.diag(found), np.mean(strays**2, axis=0) / MIXED.widths**2)
+    assert found[0, 1] == 0.0
+
+
+@pytest.mark.parametrize("n", [8, 30])
+def test_a_constant_offset_is_named_and_is_no_noise(n):
+    strays = np.random.default_rng(4).normal(0.0, 1.0, (n, 2)) * [1e-5, 20.0] + [1e-4, 0.0]
+    with pytest.warns(UserWarning, match=r"gap_m by 9\.\d+e-05 .*not noise"):
+        found = noise_from_reached(MIXED, *reports(strays))
+    expected = np.square(strays - [strays[:, 0].mean(), 0.0]).sum(axis=0) / (n - 1)
+    np.testing.assert_allclose(np.diag(found.unit_covariance(MIXED)), expected / MIXED.widths**2, rtol=1e-9)
+
+
+def test_an_offset_alone_is_no_noise():
+    with pytest.warns(UserWarning, match="T_K by 30"), pytest.raises(InputError, match="no sign of input noise"):
+        noise_from_reached(MIXED, *reports(np.tile([0.0, 30.0], (6, 1))))
+
+
+def test_noise_without_offset_is_seldom_taken_for_one():
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        for seed in range(3000):
+            noise_from_reached(MIXED, *reports(np.random.default_rng(seed).normal(0.0, 1.0, (12, 2)) * [1e-5, 20.0]))
+    assert all("off on average" in str(warning.message) for warning in found)
+    assert 0 < len(found) < 12, "3 are expected of 3000"

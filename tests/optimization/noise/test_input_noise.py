@@ -4,6 +4,8 @@ import pytest
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.optimizer import Optimizer
 
 BOX = Box({"a": (-1.0, 3.0), "b": (0.0, 10.0)})
 HAND = Box({"dx": (-0.05, 0.05), "dy": (-0.03, 0.03)})
@@ -99,3 +101,79 @@ def test_nonsense_of_a_noise_function_is_named_with_the_place(nonsense):
         noise.unit_covariance(HAND)
     with pytest.raises(InputError, match="function of x"):
         InputNoise.varying("0.1")
+
+
+MIXED = Box({"gap_m": (0.0, 1e-3), "T_K": (300.0, 1300.0), "n": (0.0, 1.0)})
+
+
+@pytest.mark.parametrize(
+    "S",
+    [
+        np.diag([1e-10, 400.0, 1e-4]),
+        np.array([[1e-10, 1e-4, 0.0], [1e-4, 400.0, 0.0], [0.0, 0.0, 1e-4]]),
+        np.array([[1e-10, 1e-4, 0.0], [1e-4, 400.0, 0.0], [0.0, 0.0, 0.0]]),
+        np.array([[1.0, 0.5, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 0.0]]) * 1e-8,
+    ],
+)
+def test_a_covariance_of_any_units_and_with_exact_variables(S):
+    noise = InputNoise(covariance=S)
+    np.testing.assert_allclose(noise.unit_covariance(MIXED), S / np.outer(MIXED.widths, MIXED.widths), rtol=1e-14)
+    root = noise.unit_roots(MIXED, np.full((1, 3), 0.5))[0] * MIXED.widths[:, None]
+    np.testing.assert_allclose(root @ root.T, S, rtol=1e-12, atol=0.0)
+    optimizer = Optimizer(MIXED, input_noise=noise, n_initial=5, seed=0)
+    for _ in range(6):
+        x = optimizer.ask()
+        optimizer.tell(x, -float(np.square(MIXED.to_unit(x) - 0.4).sum()))
+    assert np.isfinite(optimizer.recommend().mean)
+
+
+@pytest.mark.parametrize(
+    ("S", "words"),
+    [
+        (np.zeros((2, 2)), "no noise"),
+        ([[0.0, 1e-3], [1e-3, 1.0]], "row and a column of zeros"),
+        ([[-1.0, 0.0], [0.0, 1.0]], "variance is negative"),
+        ([[1e-10, 2e-4], [2e-4, 400.0]], "move exactly together"),
+        ([[1e-10, 3e-4], [3e-4, 400.0]], "positive definite"),
+    ],
+)
+def test_what_is_no_covariance(S, words):
+    with pytest.raises(InputError, match=words):
+        InputNoise(covariance=S)
+
+
+@pytest.mark.parametrize("bounds", [(0.0, 10.0), (-5.0, 5.0)])
+@pytest.mark.parametrize("shape", ["deviation", "covariance"])
+def test_noise_proportional_to_the_input_is_none_at_zero(bounds, shape):
+    box = Box({"dose": bounds})
+    states = {"deviation": lambda x: 0.05 * np.abs(x), "covariance": lambda x: np.outer(0.05 * x, 0.05 * x)}
+    noise = InputNoise.varying(states[shape])
+    assert not noise.unit_roots(box, box.to_unit([[0.0]])).any()
+    around = Perturbations.of(noise, box, "unscented").around(box.to_unit([[0.0], [4.0]]))
+    np.testing.assert_allclose(box.from_unit(around[0]), 0.0, atol=1e-12)
+    np.testing.assert_allclose(box.from_unit(around[1]).ravel(), 4.0 + 0.2 * np.array([0.0, 2**0.5, -(2**0.5)]))
+    optimizer = Optimizer(box, input_noise=noise, n_initial=5, seed=0)
+    for x in ([0.0], *box.from_unit(np.linspace(0.0, 1.0, 7)[:, None])):
+        optimizer.tell(x, -float((x[0] - 1.0) ** 2))
+    optimizer.tell(optimizer.ask(), 0.0)
+    assert np.isfinite(optimizer.recommend().mean)
+
+
+def test_a_negative_deviation_is_refused_where_it_is():
+    noise = InputNoise.varying(lambda x: 0.05 * x)
+    with pytest.raises(InputError, match=r"nonsense at .*dose.*-2.*0 or more"):
+        noise.unit_covariance(Box({"dose": (-5.0, 5.0)}), [-2.0])
+
+
+@pytest.mark.parametrize(
+    ("noise", "text"),
+    [
+        (InputNoise({"a": 0.1, "b": 0.0}), "InputNoise({'a': 0.1, 'b': 0.0})"),
+        (InputNoise.unit(0.03), "InputNoise.unit(0.03)"),
+        (InputNoise(covariance=np.eye(1)), "InputNoise(covariance=[[1.0]])"),
+        (InputNoise.varying(abs), "InputNoise.varying('abs')"),
+    ],
+)
+def test_representations(noise, text):
+    assert repr(noise) == text
+    assert noise.kind.gaussian == (not noise.varies)

@@ -1,3 +1,5 @@
+import warnings
+
 import numpy as np
 import pytest
 
@@ -104,3 +106,24 @@ def test_the_safe_hill_is_found_under_other_kinds_of_noise(noise):
 def test_noise_larger_than_the_box_is_warned_of():
     with pytest.warns(UserWarning, match="standard deviation of 3, 0.6 times the box"):
         Optimizer(Box({"dx": (0.0, 5.0)}), input_noise=InputNoise({"dx": 3.0}))
+
+
+@pytest.mark.parametrize("deviation", [0.3, 0.6])
+def test_noise_that_leaves_the_box_with_every_sigma_point(deviation):
+    """At the border rule "keep" no perturbation is left then."""
+    box = Box.unit(2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # noise larger than the box is warned of
+        optimizer = Optimizer(box, input_noise=InputNoise.unit(deviation), border="keep", n_initial=6, seed=0)
+    for _ in range(9):
+        x = optimizer.ask()
+        optimizer.tell(x, -float(np.square(x - 0.4).sum()))
+    assert np.isfinite(optimizer.recommend().mean)
+
+
+@pytest.mark.parametrize("settings", [{}, {"preset": "thesis"}, {"surrogate": "local_global"}, {"noise": "inferred"}])
+@pytest.mark.parametrize("noise", [None, InputNoise.unit(0.1), InputNoise.varying(lambda x: [0.1, 0.1])])
+@pytest.mark.parametrize("quadrature", ["bogus", "", 3])
+def test_an_unknown_quadrature_is_always_refused(settings, noise, quadrature):
+    with pytest.raises(InputError, match="quadrature"):
+        Optimizer(Box.unit(2), input_noise=noise, quadrature=quadrature, **settings)

@@ -139,3 +139,26 @@ def test_reproducible_and_counted():
     assert runs[0].evaluations == runs[1].evaluations > 17 * 2 * 3
     densities = [correlated_normal(state, NOTHING) for state in runs[0].states]
     np.testing.assert_allclose(runs[0].log_densities, densities)
+
+
+@njit(types.float64(types.float64[::1], EVIDENCE_TYPE))
+def not_a_number(theta, evidence):
+    return np.nan
+
+
+@njit(types.float64(types.float64[::1], EVIDENCE_TYPE))
+def level_everywhere(theta, evidence):
+    return 0.0
+
+
+@pytest.mark.parametrize("sampler", [coordinate_wise, elliptical])
+@pytest.mark.parametrize("start", [0.5, np.nan])
+def test_a_density_that_is_nan_ends(sampler, start):
+    chain = sampler(not_a_number, NOTHING, np.array([start]), np.random.default_rng(0), keep=2, burn_in=0)
+    assert chain.evaluations <= 1 + 2 * (2 + 1001)
+    np.testing.assert_array_equal(chain.states, start)
+
+
+def test_a_density_without_end_ends():
+    chain = coordinate_wise(level_everywhere, NOTHING, np.zeros(1), np.random.default_rng(0), keep=3, burn_in=0)
+    assert np.isfinite(chain.states).all()

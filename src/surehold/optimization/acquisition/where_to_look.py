@@ -30,7 +30,7 @@ def where_to_look(
     """
     steps = beside.around(u[None, :])[0] - u  # (s, d)
     steps = steps[np.any(steps != 0.0, axis=1)]
-    points = np.clip(u + np.concatenate([0.0 * steps[:1], steps, LOOK_BETWEEN * steps]), 0.0, 1.0)
+    points = np.clip(u + np.concatenate([np.zeros((1, len(u))), steps, LOOK_BETWEEN * steps]), 0.0, 1.0)
     offsets = perturbations.around(u[None, :])[0] - u  # (s, d)
     weights = np.append(perturbations.quadrature.weights, 1.0)
     variance_g = posterior.average(u[None, :], offsets, weights[:-1]).variance  # (m, 1)

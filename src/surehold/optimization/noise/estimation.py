@@ -1,5 +1,6 @@
 """Estimates of the input noise: from reported inputs, or from values that differ between repeated trials."""
 
+import warnings
 from typing import Final
 
 import numpy as np
@@ -15,13 +16,20 @@ __all__ = ["noise_from_reached", "noise_from_repeats"]
 
 _FEWEST_REPEATS: Final = 4  # degrees of freedom below which a variance is a guess
 _FULL: Final = 10  # reports a variable from which correlations are estimated, too
+_ROUNDING: Final = 1e-12  # differences below this, in widths of the box, are rounding
+_LEVEL: Final = 1e-3  # probability of naming an offset where there is none
 
 
 def noise_from_reached(box: Box, commanded: NDArray[np.float64], reached: NDArray[np.float64]) -> InputNoise:
     """Return the input noise that reports of reached inputs show; both (n, d) in the unit cube.
 
-    From 10 reports a variable on with correlations, from fewer the standard deviations alone. Raises InputError for
-    less than d + 2 reports.
+    From 10 reports a variable on with correlations, from fewer the standard deviations alone, as where variables stray
+    exactly in step. A constant offset is left out and named in a warning (UserWarning).
+
+    Raises
+    ------
+    InputError
+        For less than d + 2 reports, or if they show an offset and no noise.
     """
     n, d = commanded.shape
     if n < d + 2:
@@ -29,11 +37,49 @@ def noise_from_reached(box: Box, commanded: NDArray[np.float64], reached: NDArra
             f"{n} trials tell what input they reached; to estimate the noise of {d} variables, tell reached= for at "
             f"least {d + 2}."
         )
-    strays = (reached - commanded) * box.widths
-    if n < _FULL * d:
-        deviations = np.sqrt(np.mean(np.square(strays), axis=0))
-        return InputNoise(dict(zip(box.names, deviations.tolist(), strict=True)))
-    return InputNoise(covariance=strays.T @ strays / n)
+    strays = reached - commanded
+    center = _offset(box, strays)
+    strays = strays - center
+    strays[:, np.sqrt(np.mean(np.square(strays), axis=0)) < _ROUNDING] = 0.0
+    freedom = n - 1 if center.any() else n
+    if not strays.any():
+        raise InputError(
+            "the reached inputs differ from the commanded ones by the same offset every time: correct it where inputs "
+            "are commanded; there is no sign of input noise, pass input_noise=None."
+        )
+    strays = strays * box.widths
+    if n >= _FULL * d:
+        try:
+            return InputNoise(covariance=strays.T @ strays / freedom)
+        except InputError:  # some variables stray in step: no correlation below 1 says so
+            pass
+    deviations = np.sqrt(np.square(strays).sum(axis=0) / freedom)
+    return InputNoise(dict(zip(box.names, deviations.tolist(), strict=True)))
+
+
+def _offset(box: Box, strays: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the constant offset (d,) of the reached inputs, 0 in variables without a significant one; warn of it.
+
+    strays (n, d), reached less commanded inputs in the unit cube. Significant is a mean that a t test takes for 0 with
+    a probability below 0.001 divided by the number of variables.
+    """
+    from scipy.stats import t
+
+    n, d = strays.shape
+    mean, error = strays.mean(axis=0), strays.std(axis=0, ddof=1) / np.sqrt(n)
+    far = np.abs(mean) > np.maximum(t.isf(0.5 * _LEVEL / d, n - 1) * error, _ROUNDING)
+    if far.any():
+        named = ", ".join(
+            f"{name} by {m:.4g} (standard error {e:.2g})"
+            for name, m, e, shown in zip(box.names, mean * box.widths, error * box.widths, far, strict=True)
+            if shown
+        )
+        warnings.warn(
+            f"the reached inputs are off on average: {named}. A constant offset is not noise and is left out of the "
+            "estimate; correct it where inputs are commanded.",
+            stacklevel=4,
+        )
+    return np.where(far, mean, 0.0)
 
 
 def noise_from_repeats(X: NDArray[np.float64], y: NDArray[np.float64]) -> InputNoise:

@@ -2,15 +2,28 @@
 
 import warnings
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.errors import InputError, unknown_name
+from surehold.errors import InputError
 from surehold.optimization.box import Box
+from surehold.optimization.noise.gaussian import (
+    Correlated,
+    Independent,
+    ShareOfBox,
+    checked_covariance,
+    checked_deviation,
+    checked_deviations,
+)
+from surehold.optimization.noise.kinds import Kind, root_of
+from surehold.optimization.noise.uniform import Uniform
+from surehold.optimization.noise.varying import Varying
 
 __all__ = ["InputNoise", "checked_input_noise"]
+
+_NO_NOISE: Final = "input noise of 0 in every variable is no noise; pass input_noise=None."
 
 
 class InputNoise:
@@ -23,13 +36,19 @@ class InputNoise:
     standard_deviations
         `{name: standard deviation}` in the box's units, one entry a variable; 0 means that the variable is exact.
     covariance
-        Instead: a (d, d) symmetric positive definite matrix in the box's units, in the order of the box's names.
+        Instead: a (d, d) symmetric matrix in the box's units, in the order of the box's names, positive definite but
+        for zero rows and columns of exact variables. Variances may be of any scale (1e-10 m^2 beside 400 K^2).
+
+    Attributes
+    ----------
+    kind
+        The kind of noise, see `kinds.Kind`.
 
     Raises
     ------
     InputError
-        If a standard deviation is negative or not finite, the covariance is not symmetric positive definite, or
-        both or neither are given. Names and size are checked against a box in `unit_covariance`.
+        If a standard deviation is negative or not finite, the covariance is not such a matrix, or both or neither are
+        given. Names and size are checked against a box in `unit_covariance`.
 
     Examples
     --------
@@ -40,16 +59,26 @@ class InputNoise:
     array([0.03, 0.03])
     """
 
+    kind: Kind
+
     def __init__(self, standard_deviations: Mapping[str, float] | None = None, *, covariance: ArrayLike | None = None):
         if (standard_deviations is None) == (covariance is None):
             raise InputError(
                 "input noise needs either standard deviations {name: value} or covariance=, not both or neither."
             )
-        self._deviations = None if standard_deviations is None else _checked_deviations(standard_deviations)
-        self._covariance = None if covariance is None else _checked_covariance(covariance)
-        self._unit: float | None = None
-        self._function: Callable[[NDArray[np.float64]], Any] | None = None
-        self.bounded = False
+        if standard_deviations is not None:
+            self.kind = Independent(_some(checked_deviations(standard_deviations)))
+        elif covariance is not None:
+            matrix = checked_covariance(covariance)
+            if not matrix.any():
+                raise InputError(_NO_NOISE)
+            self.kind = Correlated(matrix)
+
+    @classmethod
+    def _of(cls, kind: Kind) -> "InputNoise":
+        noise = cls.__new__(cls)
+        noise.kind = kind
+        return noise
 
     @classmethod
     def uniform(cls, half_widths: Mapping[str, float]) -> "InputNoise":
@@ -64,57 +93,57 @@ class InputNoise:
         >>> InputNoise.uniform({"dx": 0.003}).unit_covariance(box)
         array([[0.0003]])
         """
-        noise = cls({name: value / 3.0**0.5 for name, value in _checked_deviations(half_widths).items()})
-        noise.bounded = True
-        return noise
+        checked = _some(checked_deviations(half_widths))
+        return cls._of(Uniform({name: value / 3.0**0.5 for name, value in checked.items()}))
 
     @classmethod
     def varying(cls, function: Callable[[NDArray[np.float64]], Any]) -> "InputNoise":
         """Return Gaussian noise that depends on the input: function(x (d,)), in the box's units.
 
         It returns what the constructor takes at that place: {name: standard deviation}, standard deviations (d,), or a
-        covariance (d, d); which variables are exact must not depend on x. What it returns is checked when it is used.
+        covariance (d, d); zeros where there is no noise. What it returns is checked when it is used.
         """
         if not callable(function):
             raise InputError(f"input noise is {function!r}; give a function of x (d,) that returns the noise there.")
-        noise = cls.unit(1.0)
-        noise._unit = None
-        noise._function = function
-        return noise
-
-    @property
-    def varies(self) -> bool:
-        """Whether the noise differs from place to place."""
-        return self._function is not None
+        return cls._of(Varying(function))
 
     @classmethod
     def unit(cls, standard_deviation: float) -> "InputNoise":
         """Return noise of the same `standard_deviation` in every variable, as a fraction of the box (0.03 = 3 %)."""
-        value = _checked_deviation("every variable", standard_deviation)
+        value = checked_deviation("every variable", standard_deviation)
         if value == 0.0:
-            raise InputError("input noise of 0 in every variable is no noise; pass input_noise=None.")
-        noise = cls.__new__(cls)
-        noise._deviations = noise._covariance = noise._function = None
-        noise._unit = value
-        noise.bounded = False
-        return noise
+            raise InputError(_NO_NOISE)
+        return cls._of(ShareOfBox(value))
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the noise is uniform within half-widths."""
+        return self.kind.bounded
+
+    @property
+    def varies(self) -> bool:
+        """Whether the noise differs from place to place."""
+        return self.kind.varies
 
     def to_json(self) -> dict[str, Any]:
         """Return constant noise as plain data, for `from_json`; raises InputError for noise that varies."""
-        if self._function is not None:
-            raise InputError(f"{self!r} is a function, which plain data cannot hold; give constant noise.")
-        covariance = None if self._covariance is None else self._covariance.tolist()
-        data = {"standard_deviations": self._deviations, "covariance": covariance, "unit": self._unit}
-        return {name: value for name, value in data.items() if value is not None} | {"bounded": self.bounded}
+        kind = self.kind
+        if isinstance(kind, Independent | Uniform):
+            return {"standard_deviations": dict(kind.deviations), "bounded": kind.bounded}
+        if isinstance(kind, ShareOfBox):
+            return {"unit": kind.deviation}
+        if isinstance(kind, Correlated):
+            return {"covariance": kind.covariance.tolist()}
+        raise InputError(f"{self!r} is a function, which plain data cannot hold; give constant noise.")
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "InputNoise":
         """Return the noise that `to_json` described."""
         if "unit" in data:
             return cls.unit(data["unit"])
-        noise = cls(data.get("standard_deviations"), covariance=data.get("covariance"))
-        noise.bounded = bool(data["bounded"])
-        return noise
+        if data.get("bounded"):
+            return cls._of(Uniform(_some(checked_deviations(data["standard_deviations"]))))
+        return cls(data.get("standard_deviations"), covariance=data.get("covariance"))
 
     def unit_covariance(self, box: Box, x: ArrayLike | None = None) -> NDArray[np.float64]:
         """Return the covariance (d, d) in the unit cube of `box`.
@@ -127,42 +156,17 @@ class InputNoise:
             If names are unknown or missing, the covariance has the wrong size for the box, or the function of varying
             noise returns something else than noise.
         """
-        if self._function is not None:
-            place = box.from_unit(np.full(box.dimension, 0.5)) if x is None else np.asarray(x, dtype=np.float64)
-            return self._at(place, box).unit_covariance(box)
-        if self._unit is not None:
-            return np.eye(box.dimension) * self._unit**2
-        if self._covariance is not None:
-            if self._covariance.shape[0] != box.dimension:
-                raise InputError(
-                    f"input-noise covariance has {self._covariance.shape[0]} rows, but the box has {box.dimension} "
-                    f"variables ({', '.join(box.names)}); give a {box.dimension} x {box.dimension} matrix."
-                )
-            return self._covariance / np.outer(box.widths, box.widths)
-        deviations = self._deviations or {}
-        for name in deviations:
-            if name not in box.names:
-                raise unknown_name("input-noise variable", name, box.names)
-        missing = [name for name in box.names if name not in deviations]
-        if missing:
-            raise InputError(
-                f"input noise says nothing about {', '.join(missing)}; give a standard deviation for each variable "
-                "(0 for one that is reached exactly)."
-            )
-        return np.diag((np.array([deviations[name] for name in box.names]) / box.widths) ** 2)
+        return self.kind.unit_covariance(box, None if x is None else np.asarray(x, dtype=np.float64))
 
     def unit_roots(self, box: Box, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return lower triangular R (q, d, d) with R R' = covariance at points U (q, d) of the unit cube."""
-        if self._function is None:
+        if not self.varies:
             return np.broadcast_to(root_of(self.unit_covariance(box)), (len(U), box.dimension, box.dimension))
         return np.array([root_of(self.unit_covariance(box, x)) for x in box.from_unit(np.clip(U, 0.0, 1.0))])
 
     def draws(self, box: Box, u: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return n draws (n, d) of the noise at a point u (d,) of the unit cube."""
-        root = self.unit_roots(box, u[None, :])[0]
-        shape = (n, box.dimension)
-        standard = rng.uniform(-(3.0**0.5), 3.0**0.5, shape) if self.bounded else rng.standard_normal(shape)
-        return standard @ root.T
+        return self.kind.draws(box, u, n, rng)
 
     def warn_if_larger_than(self, box: Box) -> None:
         """Warn of variables whose standard deviation is more than half of the box."""
@@ -176,36 +180,8 @@ class InputNoise:
                     stacklevel=3,
                 )
 
-    def _at(self, x: NDArray[np.float64], box: Box) -> "InputNoise":
-        """Return the noise that the user's function states at x (d,), checked."""
-        assert self._function is not None
-        stated = self._function(x)
-        try:
-            if isinstance(stated, Mapping):
-                return InputNoise(stated)
-            array = np.asarray(stated, dtype=np.float64)
-            if array.shape == (box.dimension,):
-                return InputNoise(dict(zip(box.names, array.tolist(), strict=True)))
-            if array.shape == (box.dimension, box.dimension):
-                return InputNoise(covariance=array)
-        except (TypeError, ValueError) as error:  # InputError is a ValueError
-            raise InputError(f"the input-noise function returned nonsense at {box.as_dict(x)}: {error}") from None
-        raise InputError(
-            f"the input-noise function returned an array of shape {array.shape} at {box.as_dict(x)}; it must return "
-            f"{{name: standard deviation}}, ({box.dimension},) or ({box.dimension}, {box.dimension})."
-        )
-
     def __repr__(self) -> str:
-        if self._function is not None:
-            return f"InputNoise.varying({getattr(self._function, '__name__', self._function)!r})"
-        if self.bounded and self._deviations is not None:
-            half_widths = {name: round(3.0**0.5 * value, 12) for name, value in self._deviations.items()}
-            return f"InputNoise.uniform({half_widths})"
-        if self._unit is not None:
-            return f"InputNoise.unit({self._unit:g})"
-        if self._covariance is not None:
-            return f"InputNoise(covariance={self._covariance.tolist()})"
-        return f"InputNoise({self._deviations})"
+        return repr(self.kind)
 
 
 def checked_input_noise(value: Any, names: tuple[str, ...]) -> InputNoise | None:
@@ -224,49 +200,7 @@ def checked_input_noise(value: Any, names: tuple[str, ...]) -> InputNoise | None
     raise InputError(f"{shown}; give sh.InputNoise({{name: standard deviation}}) for {', '.join(names)}, or None.")
 
 
-def root_of(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return L (d, d) with L L' = covariance; variables without noise have zero rows."""
-    shaken = np.flatnonzero(np.diag(covariance) > 0.0)
-    root = np.zeros_like(covariance)
-    root[np.ix_(shaken, shaken)] = np.linalg.cholesky(covariance[np.ix_(shaken, shaken)])
-    return root
-
-
-def _checked_deviation(name: str, value: float) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not np.isfinite(number) or number < 0.0:
-        raise InputError(f"input noise of {name} is {value!r}; a standard deviation is a finite number of 0 or more.")
-    return number
-
-
-def _checked_deviations(deviations: Mapping[str, float]) -> dict[str, float]:
-    if not isinstance(deviations, Mapping) or len(deviations) == 0:
-        raise InputError(f"input noise is {deviations!r}; give {{name: standard deviation}}, or InputNoise.unit(0.03).")
-    checked = {name: _checked_deviation(f"'{name}'", value) for name, value in deviations.items()}
-    if all(value == 0.0 for value in checked.values()):
-        raise InputError("input noise of 0 in every variable is no noise; pass input_noise=None.")
-    return checked
-
-
-def _checked_covariance(covariance: ArrayLike) -> NDArray[np.float64]:
-    try:
-        matrix = np.array(covariance, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"input-noise covariance {covariance!r} is not a numeric matrix.") from None
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.size == 0:
-        raise InputError(f"input-noise covariance has shape {matrix.shape}; it must be square (d, d).")
-    if not np.all(np.isfinite(matrix)):
-        raise InputError("input-noise covariance holds NaN or infinity; every entry must be finite.")
-    if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=0.0):
-        raise InputError("input-noise covariance is not symmetric; entry (i, j) must equal entry (j, i).")
-    eigenvalues = np.linalg.eigvalsh(matrix)
-    if eigenvalues[0] <= 1e-12 * max(eigenvalues[-1], 0.0) or eigenvalues[-1] <= 0.0:
-        raise InputError(
-            f"input-noise covariance is not positive definite (smallest eigenvalue {eigenvalues[0]:g}); "
-            "give standard deviations, with 0 for exact variables, if some variables carry no noise."
-        )
-    matrix.flags.writeable = False
-    return matrix
+def _some(deviations: dict[str, float]) -> dict[str, float]:
+    if all(value == 0.0 for value in deviations.values()):
+        raise InputError(_NO_NOISE)
+    return deviations

@@ -7,7 +7,6 @@ Legend
     g(x)     outcome under the input noise, E f(x + noise), about sum_i w_i f(x + xi_i)      [UO, thesis (3.21)]
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,7 +17,8 @@ from surehold.defaults import QUASI_RANDOM_EXPONENT
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.noise.quadratures import Quadrature, exact, quadrature
+from surehold.optimization.noise.kinds import Root
+from surehold.optimization.noise.quadratures import QUADRATURES, Quadrature, exact, quadrature
 from surehold.optimization.surrogates.gaussian_process.closed_form import closed_form
 from surehold.optimization.surrogates.protocol import Moments, Posterior
 
@@ -38,7 +38,7 @@ class Perturbations:
     quadrature: Quadrature
     """of the noise itself; of standard normal variables where `root` scales them"""
     border: str = "extend"
-    root: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
+    root: Root | None = None
     """for noise that varies: points (q, d) -> roots of the covariances there, (q, d, d)"""
     covariance: NDArray[np.float64] | None = None
     """(d, d) where outcomes are computed in closed form; the quadrature then serves everything else"""
@@ -58,21 +58,27 @@ class Perturbations:
         k: float = 1.0,
         exponent: int = QUASI_RANDOM_EXPONENT,
     ) -> "Perturbations":
-        """Return the perturbations of an input noise by a quadrature rule; None is no noise."""
+        """Return the perturbations of an input noise by a quadrature rule; None is no noise.
+
+        Raises
+        ------
+        InputError
+            For an unknown rule, also where there is no noise, and for a rule that does not fit the noise.
+        """
+        if rule not in (*QUADRATURES, "closed_form"):
+            raise unknown_name("quadrature", rule, (*QUADRATURES, "closed_form"))
         if noise is None:
             return cls(exact(box.dimension), border)
-        covariance = noise.unit_covariance(box)
         if rule == "closed_form":
-            if noise.bounded or noise.varies or border != "extend":
+            if not noise.kind.gaussian or border != "extend":
                 raise InputError(
                     "the quadrature 'closed_form' is for Gaussian noise that is the same everywhere and the border "
                     "rule 'extend'; choose another quadrature."
                 )
+            covariance = noise.unit_covariance(box)
             return cls(quadrature("quasi_monte_carlo", covariance), border, None, covariance)
-        if not noise.varies:
-            return cls(quadrature(rule, covariance, k, bounded=noise.bounded, exponent=exponent), border)
-        standard = np.diag((np.diag(covariance) > 0.0).astype(np.float64))
-        return cls(quadrature(rule, standard, k, exponent=exponent), border, lambda U: noise.unit_roots(box, U))
+        points, root = noise.kind.quadrature(box, rule, k, exponent)
+        return cls(points, border, root)
 
     def around(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the perturbed points (q, s, d) of U (q, d)."""

@@ -141,6 +141,10 @@ def central_difference_points(covariance: ArrayLike, step: float = 3.0**0.5) -> 
 def gauss_hermite(covariance: ArrayLike, order: int = 3, bounded: bool = False) -> Quadrature:
     """Return the product Gauss-Hermite rule of `order` points a noisy variable: s = order ** r.
 
+    The most accurate rule of its size for smooth models in two variables (GM, noise 0.1: 0.063 % of the range with 25
+    points, quasi-Monte Carlo 1.5 % with 32), and not for a narrow peak (RKHS, noise 0.02: 1.05 % with 5, quasi-Monte
+    Carlo 0.70 % with 32, sigma points 0.44 % with 3); `benchmarks.quadrature_error`, one seed.
+
     For `bounded` noise, uniform and independent, Gauss-Legendre instead. Exact for polynomials up to degree
     2 order - 1 in each variable. Raises InputError for an order below 1 or more than 10,000 points.
     """

@@ -21,7 +21,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from surehold.optimization.samplers.slice import SliceSamples, compiled_for
+from surehold.optimization.samplers.slice import SHRINKS, SliceSamples, compiled_for
 from surehold.store.kernels import njit
 
 __all__ = ["elliptical_slice_sample"]
@@ -55,6 +55,7 @@ def _sample(density, evidence, center, root, burn_in, thin, states, log_densitie
         level = remainder + log(1.0 - rng.random())
         angle = 2.0 * pi * rng.random()
         left, right = angle - 2.0 * pi, angle
+        shrinks = 0
         while True:
             for i in range(p):
                 proposal[i] = z[i] * cos(angle) + direction[i] * sin(angle)
@@ -75,7 +76,8 @@ def _sample(density, evidence, center, root, burn_in, thin, states, log_densitie
                 left = angle
             else:
                 right = angle
-            angle = left + rng.random() * (right - left)
+            shrinks += 1
+            angle = left + rng.random() * (right - left) if shrinks < SHRINKS else 0.0
         kept = step - burn_in + 1
         if kept > 0 and kept % thin == 0:
             for i in range(p):

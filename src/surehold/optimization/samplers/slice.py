@@ -4,12 +4,13 @@ Legend
     theta    state (p,)
     level    log height of the slice under the density at theta
     widths   first guess of the slice's width along each coordinate, in theta's units, (p,)
-The interval is stepped out without limit and shrunk on rejection: Neal 2003, figures 3 and 5.
+The interval is stepped out and shrunk on rejection: Neal 2003, figures 3 and 5. Both loops have a limit that no proper
+density reaches, so that one that is NaN everywhere, or does not fall off, ends them, too.
 """
 
 from functools import cache
 from math import log
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import typeof, types
@@ -17,7 +18,10 @@ from numpy.typing import NDArray
 
 from surehold.store.kernels import njit
 
-__all__ = ["SliceSamples", "compiled_for", "slice_sample"]
+__all__ = ["SHRINKS", "SliceSamples", "compiled_for", "slice_sample"]
+
+_STEPS: Final = 10_000  # of the interval to either side
+SHRINKS: Final = 1_000  # an interval shrinks to the present state, to the last bit, in about a hundred
 
 
 class SliceSamples(NamedTuple):
@@ -39,19 +43,19 @@ def _update(density, evidence, theta, i, value, width, rng):
     left = x - width * rng.random()
     right = left + width
     evaluations = 0
-    while True:
+    for _ in range(_STEPS):
         theta[i] = left
         evaluations += 1
         if not density(theta, evidence) > level:
             break
         left -= width
-    while True:
+    for _ in range(_STEPS):
         theta[i] = right
         evaluations += 1
         if not density(theta, evidence) > level:
             break
         right += width
-    while True:
+    for _ in range(SHRINKS):
         theta[i] = left + rng.random() * (right - left)
         proposed = density(theta, evidence)
         evaluations += 1
@@ -63,6 +67,8 @@ def _update(density, evidence, theta, i, value, width, rng):
             left = theta[i]
         else:
             right = theta[i]
+    theta[i] = x
+    return value, evaluations
 
 
 @njit(cache=True)

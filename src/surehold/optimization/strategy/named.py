@@ -50,7 +50,8 @@ def strategy_named(
     if input_noise is None and (name.scale != "exact" or averse):
         what = f"risk '{risk.name}'" if averse else f"criterion '{criterion}'"
         raise InputError(f"{what} needs input noise; give input_noise=.")
-    rule = quadrature or ("quasi_monte_carlo" if name.scale == "robust" or averse else "unscented")
+    default = "quasi_monte_carlo" if name.scale == "robust" or averse else "unscented"
+    rule = default if quadrature is None else quadrature
     accurate = Perturbations.of(input_noise, box, rule, border, k=k)
     risk.check_weights(accurate.quadrature.weights, rule)
     coarse = Perturbations.of(input_noise, box, "unscented", border)

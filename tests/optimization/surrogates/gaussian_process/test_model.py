@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern
 
-from surehold.errors import InputError
+from surehold.errors import InputError, SureholdError
 from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, Prior
 from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, correlation
@@ -410,3 +410,9 @@ def test_predictions_need_data_of_the_same_dimension():
         GaussianProcess().fit([[0.1], [0.9]], [0.0, 1.0]).predict([[0.1, 0.2]])
     with pytest.raises(InputError, match="length_scales"):
         GaussianProcess(length_scales=[0.1, 0.2, 0.3]).fit([[0.1], [0.9]], [0.0, 1.0])
+
+
+def test_draws_at_no_number_end_with_an_error():
+    posterior = GaussianProcess().fit([[0.1], [0.5], [0.9]], [0.0, 1.0, 0.5]).posterior
+    with pytest.raises(SureholdError, match="drawn"):
+        posterior.sample(np.full((1, 2, 1), np.nan), np.zeros((1, 2)))

@@ -160,6 +160,8 @@ class GaussianProcessPosterior:
             self.factors.inverse_L,
             self.factors.alpha,
         )
+        if np.isnan(draws).any():
+            raise SureholdError("nothing can be drawn: the covariance of the points could not be factorized.")
         return self.outputs.shift + self.outputs.scale * draws
 
     def thinned(self, count: int, first: int = 0) -> "GaussianProcessPosterior":

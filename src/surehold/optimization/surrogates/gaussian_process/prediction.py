@@ -28,6 +28,7 @@ from surehold.store.kernels import njit
 __all__ = ["average", "factorize", "sample"]
 
 _LARGEST_REPAIR = 1e-2  # nugget ratio beyond which a factorization is given up
+_REPAIRS = 12  # nuggets that are tried for a draw, each ten times the one before: NaN is never factorized
 
 
 @njit(cache=True)
@@ -161,7 +162,10 @@ def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel
 
 @njit(cache=True)
 def sample(P, normals, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha):
-    """Return joint draws (m, q, b, s) of f at the points P (q, s, d), from standard normals (b, s)."""
+    """Return joint draws (m, q, b, s) of f at the points P (q, s, d), from standard normals (b, s).
+
+    NaN where the points' covariance cannot be factorized.
+    """
     m, n = alpha.shape
     q, s, _ = P.shape
     draws = np.empty((m, q, normals.shape[0], s))
@@ -180,13 +184,17 @@ def sample(P, normals, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha
                     C[w, o] = s2[j] * C[w, o] + mean_variance
             C -= np.dot(V.T, V)
             nugget = 1e-10 * (s2[j] + mean_variance)
-            while True:
-                root = C.copy()
+            root = C.copy()
+            for _ in range(_REPAIRS):
                 for w in range(s):
+                    for o in range(w + 1):
+                        root[w, o] = C[w, o]
                     root[w, w] += nugget
                 if cholesky(root):
                     break
                 nugget *= 10.0
+            else:
+                root[:] = np.nan
             mean = np.dot(alpha[j], K)
             for b in range(normals.shape[0]):
                 for w in range(s):

@@ -1,0 +1,76 @@
+"""Gaussian input noise that differs from place to place."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+from surehold.optimization.noise.gaussian import Correlated, Independent, checked_covariance, checked_deviations
+from surehold.optimization.noise.kinds import Root, root_of
+from surehold.optimization.noise.quadratures import Quadrature, quadrature
+
+__all__ = ["Varying"]
+
+_PLACES: Final = 4  # log2 of the number of places at which variables without noise in the middle are looked at
+
+
+@dataclass(frozen=True, repr=False)
+class Varying:
+    """Noise by a function of the input."""
+
+    function: Callable[[NDArray[np.float64]], Any]
+    """x (d,) -> standard deviations by name or (d,), or a covariance (d, d), in the box's units; zeros for no noise"""
+    gaussian, bounded, varies = False, False, True
+
+    def unit_covariance(self, box: Box, x: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Return the covariance (d, d) at x (d,) in the box's units, in the middle of the box for None."""
+        place = box.from_unit(np.full(box.dimension, 0.5)) if x is None else x
+        return self._at(place, box).unit_covariance(box)
+
+    def draws(self, box: Box, u: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return n draws (n, d) at u (d,) of the unit cube."""
+        return rng.standard_normal((n, box.dimension)) @ self._roots(box, u[None, :])[0].T
+
+    def quadrature(self, box: Box, rule: str, k: float, exponent: int) -> tuple[Quadrature, Root | None]:
+        """Return the quadrature of standard normal variables and the function that returns their roots."""
+        standard = np.diag(self._shaken(box).astype(np.float64))
+        return quadrature(rule, standard, k, exponent=exponent), lambda U: self._roots(box, U)
+
+    def _roots(self, box: Box, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array([root_of(self.unit_covariance(box, x)) for x in box.from_unit(np.clip(U, 0.0, 1.0))])
+
+    def _shaken(self, box: Box) -> NDArray[np.bool_]:
+        """Tell which variables carry noise somewhere (d,); the middle of the box mostly answers alone."""
+        from scipy.stats import qmc
+
+        shaken = np.diag(self.unit_covariance(box)) > 0.0
+        if not shaken.all():
+            places = qmc.Sobol(box.dimension, scramble=False).random_base2(_PLACES) + 0.5 / 2**_PLACES
+            for x in box.from_unit(places):
+                shaken = shaken | (np.diag(self.unit_covariance(box, x)) > 0.0)
+        return shaken
+
+    def _at(self, x: NDArray[np.float64], box: Box) -> Independent | Correlated:
+        """Return the noise that the user's function states at x (d,), checked."""
+        stated = self.function(x)
+        try:
+            if isinstance(stated, Mapping):
+                return Independent(checked_deviations(stated))
+            array = np.asarray(stated, dtype=np.float64)
+            if array.shape == (box.dimension,):
+                return Independent(checked_deviations(dict(zip(box.names, array.tolist(), strict=True))))
+            if array.shape == (box.dimension, box.dimension):
+                return Correlated(checked_covariance(array))
+        except (TypeError, ValueError) as error:  # InputError is a ValueError
+            raise InputError(f"the input-noise function returned nonsense at {box.as_dict(x)}: {error}") from None
+        raise InputError(
+            f"the input-noise function returned an array of shape {array.shape} at {box.as_dict(x)}; it must return "
+            f"{{name: standard deviation}}, ({box.dimension},) or ({box.dimension}, {box.dimension})."
+        )
+
+    def __repr__(self) -> str:
+        return f"InputNoise.varying({getattr(self.function, '__name__', self.function)!r})"
