@@ -6,6 +6,7 @@ readers) and `grasps`: name -> `confidence` in [0, 1], `position` of the gripper
 `pregrasp_cspace_position` (open hand). Files are data only: nothing in them is executed, fetched or expanded.
 """
 
+import stat
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
@@ -135,7 +136,10 @@ def plain_yaml(path: str | Path) -> Any:
     """
     where = str(path)
     try:
-        if Path(path).stat().st_size > MAX_BYTES:
+        status = Path(path).stat()
+        if not stat.S_ISREG(status.st_mode):  # reading a pipe or a device might never end
+            raise InputError(f"{where!r} is no regular file; give a YAML file on disk.")
+        if status.st_size > MAX_BYTES:
             raise InputError(f"{where!r} is larger than {MAX_BYTES // 2**20} MB; split it into several files.")
         return yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_PlainLoader)
     except OSError as error:

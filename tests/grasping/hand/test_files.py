@@ -2,6 +2,7 @@
 
 import copy
 import importlib.util
+import os
 
 import mujoco
 import numpy as np
@@ -10,6 +11,7 @@ import yaml
 
 from surehold.errors import InputError
 from surehold.grasping import GraspChecker, Simulator, default_pose, hand_named
+from surehold.grasping.hand.configuration import HandConfig
 from surehold.grasping.hand.cover import cover_box, cover_mesh
 from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.kinematics import link_ends
@@ -269,3 +271,28 @@ def test_hands_that_packages_bring(name):
     best = max(grasps, key=lambda grasp: grasp.quality)
     assert best.quality > 0.01
     assert GraspChecker(simulator).check(best).verdict == "held"
+
+
+def test_careless_inertias_do_not_refuse_a_hand(tmp_path):
+    """Inertias that no body can have, or none at all, do not matter: nothing here moves by forces."""
+    path = tmp_path / "gripper.urdf"
+    for i, inertial in enumerate(
+        (
+            '<mass value="1"/><inertia ixx="1e-6" iyy="1e-6" izz="1e-5" ixy="0" ixz="0" iyz="0"/>',
+            '<mass value="0"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>',
+        )
+    ):
+        whole = '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        path.write_text(URDF.replace(whole, inertial))
+        described = copy.deepcopy(CONFIG) | {"fingers": {"left": ["a1"], "right": ["c1"]}, "coupling": {}}
+        hand = load_hand(path, HandConfig.model_validate(described))
+        assert hand.finger_names == ("left", "right"), i
+
+
+def test_a_pipe_is_no_model(tmp_path):
+    for name in ("hand.xml", "hand.yaml"):
+        os.mkfifo(tmp_path / name)
+    with pytest.raises(InputError, match="is no regular file"):
+        load_hand(tmp_path / "hand.xml", HandConfig.model_validate(CONFIG))
+    with pytest.raises(InputError, match="is no regular file"):
+        load_hand(tmp_path / "hand.xml", tmp_path / "hand.yaml")

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import os
 import struct
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from surehold.errors import InputError
 from surehold.grasping import Simulator, default_pose
 from surehold.grasping.object.mesh_files import load_mesh
+from surehold.grasping.physics.convex_pieces import convex_pieces
 
 BOX = (60.0, 40.0, 30.0)
 
@@ -103,6 +105,9 @@ def test_inside_out_is_turned_and_said(tmp_path):
 def test_a_small_hole_is_bridged_and_a_large_one_refused(tmp_path):
     loaded = load_mesh(stored(tmp_path, without(ball(), 4), "hole.ply"), "mm")
     assert "not watertight: 1 hole" in loaded.diagnosis
+    closed = trimesh.Trimesh(loaded.object.vertices, loaded.object.faces)
+    assert closed.is_watertight
+    assert len(convex_pieces(loaded.object.vertices, loaded.object.faces)) == 1, "the check by physics takes it"
     simulator = Simulator(obj=loaded.object)
     assert simulator.field.distance(np.zeros((1, 3)))[0] == pytest.approx(-0.030, abs=0.001)
     refused(stored(tmp_path, without(box(), 2), "open.stl"), "60 x 40 x 30 mm", "open surface")
@@ -158,6 +163,8 @@ def test_damaged_files(tmp_path):
         "cut.glb": stored(tmp_path, glb, "part.glb").read_bytes()[:-100],
         "list.gltf": b"[1, 2]",
         "deep.gltf": b"[" * 100_000,
+        "five.gltf": b'{"asset": {"version": "2.0"}, "meshes": 5}',
+        "count.gltf": b'{"asset": {"version": "2.0"}, "accessors": [{"count": 1000000000000, "type": "VEC3"}]}',
         "null.gltf": b'{"buffers": null}',
         "index.obj": b"v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 9\n",
         "points.obj": b"v 0 0 0\nv 1 1 1\n",
@@ -201,7 +208,23 @@ def test_buffers_elsewhere_are_refused_and_textures_ignored(tmp_path, where):
     assert load_mesh(path).object.mass == pytest.approx(0.072)
     data["buffers"][0]["uri"] = where
     path.write_text(json.dumps(data))
-    refused(path, "keeps its triangles in", unit=None)
+    refused(path, "keeps its triangles in", "outside its folder", unit=None)
+
+
+def test_a_buffer_in_the_folder_is_read_and_a_link_out_of_it_is_not(tmp_path):
+    mesh = box()
+    mesh.apply_scale(1e-3)
+    folder = tmp_path / "part"
+    folder.mkdir()
+    for name, content in trimesh.Scene(mesh).export(file_type="gltf").items():
+        (folder / name).write_bytes(content)
+    path = folder / "model.gltf"
+    uri = json.loads(path.read_text())["buffers"][0]["uri"]
+    assert not uri.startswith("data:")
+    assert load_mesh(path).object.mass == pytest.approx(0.072)
+    (folder / uri).rename(tmp_path / "data.bin")
+    (folder / uri).symlink_to(tmp_path / "data.bin")
+    refused(path, "outside its folder", unit=None)
 
 
 def test_options(tmp_path):
@@ -222,3 +245,104 @@ def test_a_user_mesh_is_grasped_like_the_same_shipped_solid(tmp_path):
     assert found.status == expected.status == "ok"
     np.testing.assert_allclose(found.joints, expected.joints, atol=0.02)
     assert found.quality == pytest.approx(expected.quality, rel=0.1)
+
+
+def boxes(*placed):
+    """Return cubes of 60 mm, or of a given size, at places along x and y, as one mesh."""
+    parts = []
+    for x, y, size, inverted in placed:
+        part = trimesh.creation.box((size, size, size))
+        part.apply_translation((x, y, 0.0))
+        if inverted:
+            part.invert()
+        parts.append(part)
+    return trimesh.util.concatenate(parts)
+
+
+@pytest.mark.parametrize(
+    ("placed", "grams", "center", "words"),
+    [
+        ([(0, 0, 60, True), (80, 0, 40, False)], 280.0, 18.2857, "1 of its 2 bodies was inside out"),
+        ([(0, 0, 60, True), (80, 0, 40, True)], 280.0, 18.2857, "it was inside out and is turned"),
+        ([(0, 0, 60, False), (60, 0, 60, False)], 432.0, 30.0, ""),
+        ([(0, 0, 60, False), (50, 0, 40, False)], 280.0, 11.4286, ""),
+        ([(0, 0, 60, False), (60, 60, 60, False)], 432.0, 30.0, ""),
+        ([(0, 0, 60, False), (60, 60, 60, True)], 432.0, 30.0, "1 of its 2 bodies was inside out"),
+        ([(0, 0, 60, False), (30, 0, 60, False)], 324.0, 15.0, "overlap by 108 ml"),
+        ([(0, 0, 60, False), (10, 0, 30, False)], 216.0, 0.0, "overlap by 27 ml"),
+        ([(0, 0, 60, False), (0, 0, 30, True)], 189.0, 0.0, ""),
+        ([(0, 0, 60, True), (0, 0, 30, False)], 189.0, 0.0, "inside out"),
+    ],
+    ids=[
+        "inverted",
+        "all-inverted",
+        "face",
+        "part-of-a-face",
+        "edge",
+        "edge-inverted",
+        "overlap",
+        "within",
+        "cavity",
+        "cavity-inverted",
+    ],
+)
+def test_bodies_are_turned_united_and_counted_once(tmp_path, placed, grams, center, words):
+    loaded = load_mesh(stored(tmp_path, boxes(*placed)), "mm", frame="file")
+    part = loaded.object
+    assert 1e3 * part.mass == pytest.approx(grams, rel=1e-6)
+    assert 1e3 * part.center_of_mass[0] == pytest.approx(center, abs=1e-3)
+    assert words in loaded.diagnosis
+    assert words or ";" not in loaded.diagnosis, "nothing to say"
+    hulls = [trimesh.convex.convex_hull(piece).volume for piece in convex_pieces(part.vertices, part.faces)]
+    assert 1e6 * sum(hulls) == pytest.approx(grams, rel=0.01), "the check by physics has the same solid"
+
+
+def test_inside_is_inside_of_a_body_that_was_turned(tmp_path):
+    part = load_mesh(stored(tmp_path, boxes((0, 0, 60, True), (80, 0, 40, False))), "mm", frame="file").object
+    found = Simulator(obj=part).field.distance(np.array([[-0.029, 0.0, 0.0], [0.080, 0.0, 0.019], [0.045, 0.0, 0.0]]))
+    np.testing.assert_allclose(found, [-0.001, -0.001, 0.015], atol=2e-4)
+
+
+def test_doubled_triangles_are_left_out(tmp_path):
+    mesh = box()
+    for name, faces in {"same": mesh.faces, "two-sided": mesh.faces[:, ::-1]}.items():
+        twice = trimesh.Trimesh(mesh.vertices, np.vstack([mesh.faces, faces]), process=False)
+        loaded = load_mesh(stored(tmp_path, twice, f"{name}.stl"), "mm")
+        assert "12 doubled triangles are left out" in loaded.diagnosis
+        assert loaded.object.mass == pytest.approx(0.072)
+
+
+def test_what_is_nearly_the_format_is_read_and_said(tmp_path):
+    binary, text = stored(tmp_path, box()).read_bytes(), box().export(file_type="stl_ascii")
+    obj = box().export(file_type="obj")
+    commas = text.replace("1.0", "1.00").replace(".", ",")
+    cases = {
+        "behind.stl": (binary + b"exported by hand" * 3, "48 bytes behind the last triangle"),
+        "zero.stl": (binary[:80] + bytes(4) + binary[84:], "counts no triangles, 12 follow"),
+        "commas.stl": (commas.encode(), "decimal commas"),
+        "mark.stl": (b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode(), "72 g"),
+        "le.obj": (obj.encode("utf-16-le"), "UTF-16"),
+        "be.obj": (obj.encode("utf-16-be"), "UTF-16"),
+        "marked.obj": (obj.encode("utf-16"), "UTF-16"),
+    }
+    for name, (content, words) in cases.items():
+        (tmp_path / name).write_bytes(content)
+        loaded = load_mesh(tmp_path / name, "mm")
+        assert loaded.object.mass == pytest.approx(0.072), name
+        assert words in loaded.diagnosis
+
+
+def test_what_is_no_mesh_is_named(tmp_path):
+    (tmp_path / "part.obj").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 625707\n")
+    refused(tmp_path / "part.obj", "a pointer of Git LFS", "git lfs pull")
+    (tmp_path / "old.gltf").write_text('{"asset": {"version": "1.0"}, "meshes": {}, "buffers": {}}')
+    refused(tmp_path / "old.gltf", "is glTF 1.0; export it as glTF 2.0", unit=None)
+    (tmp_path / "old.glb").write_bytes(b"glTF" + struct.pack("<IIII", 1, 24, 4, 0) + b"{}  ")
+    refused(tmp_path / "old.glb", "is glTF 1; export", unit=None)
+
+
+def test_pipes_and_devices_are_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe.stl")
+    (tmp_path / "endless.obj").symlink_to("/dev/zero")
+    for name in ("pipe.stl", "endless.obj"):
+        refused(tmp_path / name, "is no regular file")

@@ -11,6 +11,7 @@ Nothing in a model is executed, and no plugin is loaded; meshes are read from th
 
 import importlib
 import importlib.util
+import stat
 import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -50,7 +51,10 @@ def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
     if path.suffix.lower() not in (".xml", ".urdf", ".mjcf"):
         raise InputError(f"{str(model)!r} is no model of a hand; give an .xml (MJCF) or .urdf file.")
     try:
-        if path.stat().st_size > _MOST_BYTES:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):  # reading a pipe or a device might never end
+            raise InputError(f"{str(model)!r} is no regular file; give a model on disk.")
+        if status.st_size > _MOST_BYTES:
             raise InputError(f"{str(model)!r} is larger than 64 MB; give a model of the hand alone.")
         compiled = _compiled(mujoco, path)
     except OSError as error:
@@ -93,6 +97,8 @@ def _compiled(mujoco: Any, path: Path) -> Any:
             warnings.simplefilter("ignore")
             spec = mujoco.MjSpec.from_file(str(path))
             spec.compiler.fusestatic = False  # bodies keep their names
+            # Nothing moves by forces here: inertias that no body can have shall not refuse a hand.
+            spec.compiler.balanceinertia, spec.compiler.boundmass, spec.compiler.boundinertia = True, 1e-6, 1e-12
             return spec.compile()
     finally:
         mujoco.set_mju_user_warning(before)

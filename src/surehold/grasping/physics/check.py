@@ -7,7 +7,9 @@ The closed grasp of a trial is taken over as it is: palm fixed, fingers under po
 object free and, at first, without weight. The fingers squeeze: their targets move on in the direction of closing, in
 `SQUEEZE` seconds, until the torques are at their limits. From that state gravity pulls for a second in one of six
 directions of the palm's frame, or the object weighs and is shaken to and fro along each axis. Each load is a run of
-its own. What counts is how far the object's center of mass moves and how far the object turns under the load.
+its own. What counts is how far the object's center of mass moves and how far the object turns under the load. An object
+that holds under every load, but that the squeeze moved beyond `RATED`, is "moved": what held is not the grasp that was
+rated. The quality of the contacts that it has after the squeeze is given beside.
 
 The object is made of convex pieces (convex_pieces.py), links are capsules, the palm is made of boxes with round edges;
 only contacts between hand and object are simulated. Contacts have the friction of the simulator, and its torsional
@@ -34,13 +36,14 @@ from surehold.grasping.wrench.friction_cones import soft_finger_torsion
 
 __all__ = ["LOADS", "GraspCheck", "GraspChecker", "LoadOutcome"]
 
-Verdict = Literal["held", "slipped", "dropped"]
-_VERDICTS: Final[tuple[Verdict, ...]] = ("held", "slipped", "dropped")
+Verdict = Literal["held", "moved", "slipped", "dropped"]
+_VERDICTS: Final[tuple[Verdict, ...]] = ("held", "moved", "slipped", "dropped")
 
 SQUEEZE: Final = 0.5  #: time in which the fingers squeeze, before the load [s]
 LOAD_TIME: Final = 1.0  #: time under load [s]
 SHAKE: Final = 5.0  #: acceleration of the shake [m/s^2]
 HELD: Final = (0.010, np.radians(20.0))  #: a held object moves and turns less than this [m, rad]
+RATED: Final = (0.005, np.radians(5.0))  #: a grasp is the one that was rated if the squeeze moves the object less
 DROPPED: Final = 0.050  #: an object that moves farther is dropped [m]
 PATCH: Final = 0.003  #: least radius of a patch of contact, for the torsional friction [m]
 
@@ -68,10 +71,12 @@ class LoadOutcome(NamedTuple):
 
 @dataclass(frozen=True)
 class GraspCheck:
-    """The verdict on a grasp: that of its worst load."""
+    """The verdict on a grasp: that of its worst load, or "moved" if all hold after a squeeze that moved the object."""
 
     verdict: Verdict
-    settled: float  #: how far the object moved while the fingers squeezed [m]
+    settled: float  #: how far the object's center of mass moved while the fingers squeezed [m]
+    settled_turn: float  #: how far the object turned meanwhile [rad]
+    settled_quality: float  #: quality of the skin's contacts after the squeeze; 0 if that dropped the object
     loads: tuple[LoadOutcome, ...]  #: in the order of `LOADS`
 
     @property
@@ -142,7 +147,9 @@ class GraspChecker:
 
     def checks(self, grasps: Sequence[Grasp]) -> list[GraspCheck]:
         """Return the verdicts on many grasps, in parallel on the threads."""
-        lost = GraspCheck("dropped", np.inf, tuple(LoadOutcome(name, "dropped", np.inf, np.inf) for name in LOADS))
+        lost = GraspCheck(
+            "dropped", np.inf, np.pi, 0.0, tuple(LoadOutcome(name, "dropped", np.inf, np.inf) for name in LOADS)
+        )
         found = [lost] * len(grasps)
         closed = [i for i, grasp in enumerate(grasps) if grasp.status != "initial collision"]
         for start in range(0, len(closed), 64):  # bounds the memory of the states
@@ -174,7 +181,7 @@ class GraspChecker:
                 moved, turned = np.maximum(moved, far.max(axis=1)), np.maximum(turned, turn.max(axis=1))
                 states = states[:, -1]
         first = np.stack([self._state(grasp) for grasp in grasps])
-        squeezed = _motion(model, first, settled)[0]
+        squeezed, twisted = _motion(model, first, settled)
         checks = []
         for i in range(n):
             rows = slice(i * len(LOADS), (i + 1) * len(LOADS))
@@ -183,7 +190,12 @@ class GraspChecker:
                 for name, far, turn in zip(LOADS, moved[rows], turned[rows], strict=True)
             )
             worst = _VERDICTS[max(_VERDICTS.index(load.verdict) for load in loads)]
-            checks.append(GraspCheck("dropped" if squeezed[i] > DROPPED else worst, float(squeezed[i]), loads))
+            if squeezed[i] > DROPPED:
+                worst = "dropped"
+            elif worst == "held" and (squeezed[i] >= RATED[0] or twisted[i] >= RATED[1]):
+                worst = "moved"
+            quality = 0.0 if squeezed[i] > DROPPED else self._quality(settled[i], grasps[i])
+            checks.append(GraspCheck(worst, float(squeezed[i]), float(twisted[i]), quality, loads))
         return checks
 
     def _advance(
@@ -209,6 +221,16 @@ class GraspChecker:
             nstep=round(_PHASE / _STEP),
         )
         return np.array(reached)
+
+    def _quality(self, state: NDArray[np.float64], grasp: Grasp) -> float:
+        """Return the quality of the contacts where the fingers and the object are in a state."""
+        simulator, n = self.simulator, len(self._moving)
+        x, y, z, *quaternion = state[1 + n : 8 + n]  # after the time and the joints
+        w, i, j, k = np.asarray(quaternion) / np.linalg.norm(quaternion)
+        palm = Pose((float(x), float(y), float(z)), (float(w), float(i), float(j), float(k))).inverse()
+        joints = grasp.joints.copy()
+        joints.ravel()[self._moving] = state[1 : 1 + n]
+        return simulator.quality_at(palm, joints)
 
     def _state(self, grasp: Grasp) -> NDArray[np.float64]:
         """Return the initial state: time, positions (joints, then the object's pose in the palm frame), velocities."""

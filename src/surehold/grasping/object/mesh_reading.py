@@ -1,0 +1,189 @@
+"""Triangles from the bytes of a mesh file: STL, OBJ, PLY, glTF and GLB.
+
+Nothing but a regular file is read: no device, no pipe, no archive. Material files and textures that a file names are
+neither looked for nor fetched; of a glTF, a buffer in the same folder or below is read, and no other.
+
+Read although it is not quite what the format says: text in UTF-16, decimal commas, a binary STL followed by other bytes
+or whose header counts no triangles. A note says so.
+"""
+
+import base64
+import io
+import json
+import re
+import stat
+import struct
+import warnings
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError
+
+__all__ = ["MESH_FORMATS", "read_mesh"]
+
+MESH_FORMATS: Final = ("stl", "obj", "ply", "gltf", "glb")
+_MOST_BYTES: Final = 2**30
+
+
+def read_mesh(file: Path, kind: str) -> tuple[NDArray[np.float64], NDArray[np.int64], list[str]]:
+    """Return vertices (v, 3) in the file's unit, faces (f, 3), and notes on how the file was read.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is no mesh of that kind, or has its triangles where they are not read from.
+    """
+    import trimesh
+
+    notes: list[str] = []
+    content = _bytes(file)
+    if content[:4] == b"PK\x03\x04" or content[:2] in (b"\x1f\x8b", b"BZ"):
+        raise InputError(f"{file.name!r} is an archive; unpack it and give the mesh inside.")
+    if content.startswith(b"version https://git-lfs"):
+        raise InputError(f"{file.name!r} is a pointer of Git LFS, not the mesh; run git lfs pull and give it again.")
+    if kind == "stl" and not (content[:5].lower() == b"solid" and b"facet" in content[:2000]):
+        content = _binary_stl(content, notes)
+    if kind in ("gltf", "glb"):
+        content = _self_contained(file, content, kind)
+    elif not _is_binary(content, kind):
+        content = _plain_text(content, notes)
+    if kind == "obj":
+        content = b"\n".join(line for line in content.splitlines() if line[:6] not in (b"mtllib", b"usemtl"))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of coordinates that are not finite, which are refused later
+            scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=_Nothing(), process=False)
+        meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+    except MemoryError:
+        raise InputError(f"{file.name!r} does not fit into memory; simplify the mesh.") from None
+    except Exception as error:  # a damaged file can make the reader stumble anywhere
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        raise InputError(f"{file.name!r} cannot be read as {kind.upper()}: {reason}.") from None
+    if not meshes:
+        raise InputError(f"{file.name!r} holds no triangles; export a surface mesh.")
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
+    vertices = np.vstack([np.asarray(mesh.vertices, dtype=np.float64) for mesh in meshes])
+    faces = np.vstack([np.asarray(mesh.faces) + start for mesh, start in zip(meshes, starts, strict=True)])
+    return vertices, faces.astype(np.int64), notes
+
+
+class _Nothing(dict):
+    """What a file may refer to: nothing outside itself."""
+
+    def __missing__(self, name: str) -> bytes:
+        raise InputError(f"it refers to {str(name)[:60]!r}, which is not inside; export one self-contained file (GLB)")
+
+
+def _bytes(file: Path) -> bytes:
+    """Return the content of a regular file of at most 1 GB."""
+    try:
+        status = file.stat()
+        if not stat.S_ISREG(status.st_mode):  # reading a pipe or a device might never end
+            raise InputError(f"{str(file)!r} is no regular file; give a file on disk.")
+        if status.st_size > _MOST_BYTES:
+            raise InputError(f"{file.name!r} is larger than 1 GB; simplify the mesh.")
+        return file.read_bytes()
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"cannot read {str(file)!r}: {getattr(error, 'strerror', None) or error}.") from None
+
+
+def _binary_stl(content: bytes, notes: list[str]) -> bytes:
+    """Return a binary STL whose header counts the triangles that follow, and nothing behind them."""
+    if len(content) < 134:
+        return content
+    count, behind = struct.unpack("<I", content[80:84])[0], len(content) - 84
+    if count == 0 and behind % 50 == 0:
+        notes.append(f"its header counts no triangles, {behind // 50:,} follow and are read")
+        return content[:80] + struct.pack("<I", behind // 50) + content[84:]
+    if 0 < 50 * count < behind:
+        notes.append(f"{behind - 50 * count:,} bytes behind the last triangle are ignored")
+        return content[: 84 + 50 * count]
+    return content
+
+
+def _is_binary(content: bytes, kind: str) -> bool:
+    if kind == "stl":
+        return len(content) >= 84 and len(content) == 84 + 50 * struct.unpack("<I", content[80:84])[0]
+    return kind == "ply" and b"format binary" in content[:200]
+
+
+def _plain_text(content: bytes, notes: list[str]) -> bytes:
+    """Return text as UTF-8 without a byte order mark and with decimal points."""
+    even, odd = content[0:400:2], content[1:400:2]
+    wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
+    if wide or (len(odd) and not any(even) and all(odd)) or (len(odd) and not any(odd) and all(even)):
+        encoding = "utf-16" if wide else ("utf-16-le" if any(even) else "utf-16-be")
+        content = content.decode(encoding, errors="replace").encode()
+        notes.append("its text is UTF-16")
+    content = content.removeprefix(b"\xef\xbb\xbf")
+    if re.search(rb"\d,\d", content) and not re.search(rb"\d\.\d", content):
+        content = content.replace(b",", b".")
+        notes.append("its decimal commas are read as points")
+    return content
+
+
+def _self_contained(file: Path, content: bytes, kind: str) -> bytes:
+    """Return a glTF with its buffers inside and without materials and images, or raise InputError."""
+    name, binary, text = file.name, b"", content
+    if kind == "glb":
+        if content[:4] != b"glTF" or len(content) < 20:
+            raise InputError(f"{name!r} is not a GLB file.")
+        version, _, length = struct.unpack("<III", content[4:16])
+        if version != 2:
+            raise InputError(f"{name!r} is glTF {version}; export it as glTF 2.0.")
+        text, binary = content[20 : 20 + length], content[20 + length :]
+    try:
+        data: Any = json.loads(text)
+        if not isinstance(data, dict):
+            raise ValueError("it is no mapping")
+        version = str(data.get("asset", {}).get("version", "2.0"))
+        if not version.startswith("2"):
+            raise InputError(f"{name!r} is glTF {version[:10]}; export it as glTF 2.0.")
+        for key in ("buffers", "meshes", "accessors"):
+            if not isinstance(data.get(key, []), list) or not all(isinstance(e, dict) for e in data.get(key, [])):
+                raise ValueError(f"its {key} are no list of mappings, but {str(data[key])[:40]}")
+        room = len(content)
+        for buffer in data.get("buffers", []):
+            where = buffer.get("uri")
+            if where is not None and not str(where).startswith("data:"):
+                inside = _buffer(file, str(where))
+                room += len(inside)
+                buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(inside).decode()
+        if any(accessor.get("count", 0) > room for accessor in data.get("accessors", [])):
+            raise ValueError("it counts more numbers than it has bytes")
+        packed = [e for e in data.get("extensionsRequired", []) if "compression" in str(e) or "meshopt" in str(e)]
+        if packed:
+            raise InputError(f"{name!r} is compressed ({packed[0]}); export it without compression.")
+        for key in ("images", "textures", "materials", "samplers", "extensionsRequired", "extensionsUsed"):
+            data.pop(key, None)
+        for mesh in data.get("meshes", []):
+            for primitive in mesh.get("primitives", []):
+                primitive.pop("material", None)
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{name!r} is not glTF: {' '.join(str(error).split())[:120]}.") from None
+    text = json.dumps(data).encode()
+    if kind == "gltf":
+        return text
+    text += b" " * (-len(text) % 4)
+    head = b"glTF" + struct.pack("<II", 2, 20 + len(text) + len(binary)) + struct.pack("<I", len(text)) + b"JSON"
+    return head + text + binary
+
+
+def _buffer(file: Path, uri: str) -> bytes:
+    """Return a buffer that lies in the folder of a glTF or below."""
+    folder = file.parent.resolve()
+    where = (folder / unquote(uri).replace("\0", "")).resolve()
+    if "://" in uri or not where.is_relative_to(folder):
+        raise InputError(
+            f"{file.name!r} keeps its triangles in {uri[:60]!r}, outside its folder; export one self-contained file "
+            "(GLB)."
+        )
+    return _bytes(where)
