@@ -141,9 +141,9 @@ class ScikitOptimize:
 class BoTorch:
     """BoTorch: SingleTaskGP and LogExpectedImprovement; with the noise known, its input perturbation.
 
-    With `root` (d, d) of the noise's covariance in the unit cube (`bounded` for uniform noise) the model averages over 16
-    quasi-random perturbations, the criterion is the expected improvement of that average, and the answer the observed
-    input with the best one.
+    With `root` (d, d) of the noise's covariance in the unit cube (`bounded` for uniform noise) the model averages over
+    16 quasi-random perturbations, the criterion is the expected improvement of that average, and the answer the
+    observed input with the best one.
     """
 
     def __init__(self, dimension: int, initial: Array, seed: int, root: Array | None = None, bounded: bool = False):
