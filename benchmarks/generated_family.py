@@ -19,6 +19,7 @@ import time
 
 import numpy as np
 from joblib import Parallel, delayed
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
@@ -151,7 +152,7 @@ def main():
                 file=sys.stderr,
                 flush=True,
             )
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, TerminatedWorkerError):  # keep what was done
         print(f"interrupted after {len(rows)} of {len(tasks)} runs", file=sys.stderr)
     if arguments.out and rows:
         with open(arguments.out, "w", newline="") as file:

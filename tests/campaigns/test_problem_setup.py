@@ -2,9 +2,12 @@ import numpy as np
 import pytest
 
 from surehold.campaigns.plan import ProblemSetup
-from surehold.campaigns.problem_setup import build_problem, noise_of, observer
+from surehold.campaigns.problem_setup import build_problem, checked_problem, noise_of, observer, unit_noise_of
+from surehold.errors import InputError
 from surehold.grasping.wrench.simox import object_wrench_space, simox_quality
+from surehold.optimization.box import Box
 from surehold.problems.grasp.problem import GraspProblem
+from surehold.problems.named import robust_problem
 from surehold.problems.synthetic import GM
 
 
@@ -49,6 +52,26 @@ def test_noise_of_a_problem():
     noise = noise_of(ProblemSetup("gm", 8, 5, input_noise=0.1))
     assert noise is not None
     assert noise.unit_covariance(box) == pytest.approx(np.eye(2) * 0.01)
+
+
+@pytest.mark.parametrize("name", ["nes-polynomial", "qing-branin", "qing-sin-linear-uniform"])
+def test_a_robust_problem_brings_its_own_noise(name):
+    on = ProblemSetup(name, 8, 5, input_noise="own")
+    stated = robust_problem(name)
+    box = stated.function.box
+    assert build_problem(on).name == name
+    noise = noise_of(on)
+    assert noise.unit_covariance(box) == pytest.approx(stated.noise.unit_covariance(box))
+    unit = unit_noise_of(on)
+    assert unit.bounded == stated.noise.bounded
+    assert unit.unit_covariance(Box.unit(box.dimension)) == pytest.approx(stated.noise.unit_covariance(box))
+
+
+def test_noise_of_its_own_needs_a_problem_that_states_it():
+    with pytest.raises(InputError, match="states no input noise"):
+        checked_problem("a", ProblemSetup("gm", 8, 5, input_noise="own"))
+    with pytest.raises(InputError, match="exact inputs"):
+        noise_of(ProblemSetup("rahbo-branin", 8, 5, input_noise="own"))
 
 
 def test_observation_noise_is_the_absolute_value_of_a_normal_one():

@@ -6,9 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from surehold.campaigns.plan import MethodSetup, Plan, ProblemSetup
+from surehold.campaigns.plan_file import load_plan
 from surehold.campaigns.single_run import TIMES, changes, expanded, run_once
 from surehold.optimization.maximization import maximize
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.problems.named import robust_problem
 from surehold.problems.perturbation import robust_score
 from surehold.problems.synthetic import RKHS, synthetic_function
 
@@ -142,3 +144,14 @@ def test_rows_carry_settings_and_versions():
 def test_scores_stay_below_the_optimum():
     row = run_once(cell_of(ProblemSetup("gm", 12, 10, input_noise=0.1), MethodSetup(robust=True)), 0)
     assert row["best"][-1][1] <= synthetic_function("gm").optimum.value
+
+
+def test_regret_under_a_problems_own_noise():
+    plan = load_plan("robust-published")
+    (cell,) = [c for c in plan.cells() if (c.problem, c.method) == ("Qing sin + linear", "random")]
+    row = run_once(cell, 0)
+    problem = robust_problem("qing-sin-linear")
+    assert row["status"] == "done"
+    best = problem.function.box.from_unit(np.array(row["x"]))
+    assert row["regret"][-1][1] == pytest.approx(problem.optimum.value - problem.value(best[None])[0], abs=1e-6)
+    assert min(regret for _, regret in row["regret"]) > -1e-5

@@ -27,7 +27,7 @@ def robust_problem(name: str) -> RobustProblem:
     --------
     >>> problem = robust_problem("nes-sin-linear")
     >>> problem.trials, float(problem.optimum.value)
-    (23, 1.0421)
+    (23, 1.042098)
     """
     if name not in _ROBUST:
         raise unknown_name("robust problem", name, _ROBUST)
