@@ -178,7 +178,9 @@ def test_a_hand_that_strays_over_the_border_is_learnt_from(settings):
 SURROGATES = ["gp", "tgp", "local_global", TreedGaussianProcess(min_leaf=4, trees=2)]
 
 
-@pytest.mark.parametrize("surrogate", SURROGATES, ids=str)
+@pytest.mark.parametrize(
+    "surrogate", SURROGATES, ids=lambda surrogate: surrogate if isinstance(surrogate, str) else "tree_object"
+)
 @pytest.mark.parametrize("robust", [False, True])
 def test_reached_anywhere_does_no_harm(surrogate, robust):
     """Far away trials, told with the highest and the lowest values, spoil neither the model nor the search."""
