@@ -23,7 +23,7 @@ def worth(problem, x, noise):
 
 
 def run(name, collision, seed, noise, ruler):
-    problem = sh.problems.Grasp(name, variables=VARIABLES, collision=collision)
+    problem = sh.problems.GraspProblem(name, variables=VARIABLES, collision=collision)
     optimizer = sh.Optimizer(problem.box, input_noise=noise, n_initial=INITIAL, seed=seed)
     scores, collided = [], 0
     for n in range(1, CHECKS[-1] + 1):
@@ -39,7 +39,7 @@ def run(name, collision, seed, noise, ruler):
 def main(names):
     noise = sh.InputNoise.unit(0.03)
     for name in names:
-        ruler = sh.problems.Grasp(name, variables=VARIABLES, collision="zero")
+        ruler = sh.problems.GraspProblem(name, variables=VARIABLES, collision="zero")
         rows = {c: np.array([run(name, c, seed, noise, ruler) for seed in range(SEEDS)]) for c in ("zero", "penalty")}
         means = {c: table.mean(axis=0)[:-1] for c, table in rows.items()}
         reached = np.flatnonzero(np.maximum.accumulate(means["penalty"]) >= means["zero"].max())

@@ -15,7 +15,7 @@ from scipy.stats import spearmanr
 from surehold.grasping import OBJECTS
 from surehold.grasping.physics.check import GraspChecker
 from surehold.optimization.numerics.threads import single_threaded
-from surehold.problems import Grasp
+from surehold.problems import GraspProblem
 
 DRAWN, CHECKED, BINS = 1500, 60, 5
 
@@ -35,7 +35,7 @@ def sample(problem):
 
 def main(names):
     for name in names:
-        problem = Grasp(name, variables=("dx", "dy", "dz"))
+        problem = GraspProblem(name, variables=("dx", "dy", "dz"))
         grasps, quality, kind = sample(problem)
         checker = GraspChecker(problem.simulator)
         start = time.process_time()
@@ -49,7 +49,7 @@ def main(names):
             if not mine.any():
                 continue
             verdicts = [checks[i].verdict for i in np.flatnonzero(mine)]
-            shares = ", ".join(f"{v} {verdicts.count(v)}" for v in ("held", "slipped", "dropped"))
+            shares = ", ".join(f"{v} {verdicts.count(v)}" for v in ("held", "moved", "slipped", "dropped"))
             low, high = quality[mine].min(), quality[mine].max()
             above = held[quality >= low].mean()
             print(f"  quality {low:.3f} to {high:.3f}: {shares}; at or above held {above:.2f}", flush=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from surehold.grasping import CONTACT_MODELS, OBJECTS
 from surehold.optimization.numerics.threads import single_threaded
-from surehold.problems import Grasp
+from surehold.problems import GraspProblem
 
 STEP = 0.000125
 LINES = (-0.4, 0.0, 0.4)
@@ -41,7 +41,7 @@ def main(names, figure):
     print(f"{'object':8} {'contact':8} {'rough %':>20} {'step %':>20} {'jumps':>12}")
     for name in names:
         for contact in reversed(CONTACT_MODELS):
-            problem = Grasp(name, contact=contact)
+            problem = GraspProblem(name, contact=contact)
             problem.warm_up()
             lines = [line(problem, share) for share in LINES]
             rows = [measures(quality) for _, quality in lines]

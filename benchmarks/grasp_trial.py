@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from surehold.grasping import CONTACT_MODELS, OBJECTS, STATUSES
 from surehold.optimization.numerics.threads import single_threaded
-from surehold.problems import Grasp
+from surehold.problems import GraspProblem
 
 TRIALS = 400
 
@@ -30,7 +30,7 @@ def main(names):
     print(f"{'object':8} {'contact':8} {'all ms':>13} {'free ms':>13}  status")
     for name in names:
         for contact in CONTACT_MODELS:
-            problem = Grasp(name, contact=contact)
+            problem = GraspProblem(name, contact=contact)
             problem.warm_up()
             points = problem.box.from_unit(qmc.LatinHypercube(2, rng=0).random(TRIALS))
             timed(problem, points[:20])

@@ -23,7 +23,7 @@ POSES = 512
 
 def trials_of(obj, seed, n_trials=100, n_initial=40):
     """Return the problem and an optimizer that has made the trials of `surehold grasp`."""
-    problem = sh.problems.Grasp(obj)
+    problem = sh.problems.GraspProblem(obj)
     noise = sh.InputNoise.unit(0.03)
     result = sh.maximize(problem, problem.box, n_trials, n_initial=n_initial, seed=seed, input_noise=noise)
     return problem, result.optimizer

@@ -50,7 +50,7 @@ CHUNK = 2**15
 
 
 def grasp_problem(name):
-    function = sh.problems.Grasp(name.split()[0], variables=GRASPS[name])
+    function = sh.problems.GraspProblem(name.split()[0], variables=GRASPS[name])
     return RobustProblem(function, sh.InputNoise.unit(0.03))
 
 

@@ -103,7 +103,9 @@ def main():
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS))
     arguments = parser.parse_args()
     rows, source = finished(arguments.rows), versions()["source"]
-    built = {name: sh.problems.Grasp(PROBLEMS[name][0], variables=PROBLEMS[name][1]) for name in arguments.problems}
+    built = {
+        name: sh.problems.GraspProblem(PROBLEMS[name][0], variables=PROBLEMS[name][1]) for name in arguments.problems
+    }
     for seed in range(arguments.seeds):
         for name, problem in built.items():
             for method in arguments.methods:

@@ -67,7 +67,7 @@ def gm(seeds=20):
 
 
 def mug(seeds=10):
-    problem, noise = sh.problems.Grasp("mug"), sh.InputNoise.unit(0.03)
+    problem, noise = sh.problems.GraspProblem("mug"), sh.InputNoise.unit(0.03)
     rows = []
     for seed in range(seeds):
         plain, _ = run(problem, 100, 40, seed, None)

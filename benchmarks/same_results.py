@@ -61,7 +61,7 @@ GRASP_OPTIONS: tuple[dict[str, Any], ...] = (
 
 def _problem(name: str) -> Any:
     if name in OBJECTS:
-        return sh.problems.Grasp(name, facet="right-front", variables=("dx", "dy"))
+        return sh.problems.GraspProblem(name, facet="right-front", variables=("dx", "dy"))
     return {"rkhs": sh.problems.RKHS, "gf": sh.problems.GF, "gm": sh.problems.GM}[name]()
 
 
@@ -88,7 +88,7 @@ def grasps(each: int = 12) -> Iterator[tuple[str, list[float]]]:
     for o, obj in enumerate(OBJECTS):
         for k, options in enumerate(GRASP_OPTIONS):
             facet = FACETS[(o + k) % len(FACETS)]
-            problem = sh.problems.Grasp(
+            problem = sh.problems.GraspProblem(
                 obj, facet=facet, variables=("dx", "dy", "dz", "rx", "ry", "rz", "s1"), **options
             )
             rng = np.random.default_rng([o, k])

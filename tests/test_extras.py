@@ -33,7 +33,7 @@ print("works")
 """
 
 DOORS = {
-    "grasp": "surehold.problems.Grasp",
+    "grasp": "surehold.problems.GraspProblem",
     "study": "surehold.Sampler",
     "report": "import surehold.reports",
     "campaign": "import surehold.campaigns",

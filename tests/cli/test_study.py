@@ -316,7 +316,7 @@ def test_a_grasp_is_kept_and_worked_on(study):
     trials = study("export mug")["trials"]
     assert len(trials) == 6
     assert study("status mug")["units"] == {"dx": "m", "dy": "m"}
-    problem = sh.problems.Grasp("mug", quality="volume", closing="synergy")
+    problem = sh.problems.GraspProblem("mug", quality="volume", closing="synergy")
     for trial in trials[3:]:  # one made by the command, two by the worker from what the study says of the problem
         assert trial["value"] == problem([trial["dx"], trial["dy"]])
 

@@ -262,7 +262,7 @@ def test_minimizing_is_maximizing_turned_over(noise):
 def test_probabilities_of_a_minimum_are_of_the_users_values():
     best = minimize(valley, BOX, n_trials=10, seed=2, input_noise=InputNoise.unit(0.05)).recommendation
     draws = np.random.default_rng(0).standard_normal(200_000)
-    sampled = np.random.default_rng(1).choice(best.outcome.means, 200_000) + draws * best.outcome.stds.mean()
+    sampled = np.random.default_rng(1).choice(best.execution.means, 200_000) + draws * best.execution.stds.mean()
     assert best.probability_below(best.quantile) == pytest.approx(0.95, abs=1e-6)
     assert best.mean == pytest.approx(sampled.mean(), abs=0.01)
 

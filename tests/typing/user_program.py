@@ -23,6 +23,6 @@ def outcome(x: NDArray[np.float64]) -> float:
 
 result = sh.maximize(outcome, box, 40, seed=1)
 assert_type(result, sh.Result)
-grasp = sh.problems.Grasp("mug", variables=("dx", "dy"), contact="graded")
+grasp = sh.problems.GraspProblem("mug", variables=("dx", "dy"), contact="graded")
 assert_type(grasp(x), float | NDArray[np.float64])
 assert_type(sh.__version__, str)

@@ -17,13 +17,14 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
-from surehold.optimization.lattice import Lattice, LatticePosterior, with_fixed
+from surehold.optimization.lattice import Lattice, with_fixed
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.recommendation import Recommendation, recommendation
+from surehold.optimization.response_model import ResponseModel, chosen_surrogate
 from surehold.optimization.strategy.initial_design import design as initial_design
 from surehold.optimization.strategy.named import strategy_named
 from surehold.optimization.strategy.promise import promise
@@ -31,8 +32,6 @@ from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.strategy.trust_region import TrustRegion
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
-from surehold.optimization.surrogates.named import refuse_settings, surrogate_named
-from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate, mixture
 from surehold.optimization.trials import AskedTrial, Trials, initial_inputs, number_of, same
 
@@ -164,19 +163,16 @@ class Optimizer:
         if output_range is not None and direction == "minimize":
             output_range = (-output_range[1], -output_range[0])
         thesis = None if preset is None else thesis_preset(preset)
-        deviations = np.zeros(box.dimension)
-        if input_noise is not None:
-            deviations = np.sqrt(np.diag(input_noise.unit_covariance(box)))
-        if not isinstance(surrogate, str):
-            refuse_settings("a surrogate object", noise, output_range)
-            self._surrogate: Surrogate = surrogate
-        elif thesis is not None:
-            refuse_settings(f"preset='{preset}'", noise, output_range)
-            self._surrogate = thesis.surrogate(surrogate, deviations, self.seed)
-        else:
-            self._surrogate = surrogate_named(
-                surrogate, noise=noise, output_range=output_range, input_deviations=deviations, seed=self.seed
-            )
+        model = chosen_surrogate(
+            surrogate,
+            preset=preset,
+            thesis=thesis,
+            noise=noise,
+            output_range=output_range,
+            box=box,
+            input_noise=input_noise,
+            seed=self.seed,
+        )
         if input_noise is not None:
             input_noise.warn_if_larger_than(box)
         self._strategy = strategy_named(
@@ -188,23 +184,29 @@ class Optimizer:
             k=k,
             border=border,
             kappa=kappa,
-            noisy=getattr(self._surrogate, "noisy", False) or noise_while_exploring,
+            noisy=getattr(model, "noisy", False) or noise_while_exploring,
             trust_region=TrustRegion(self.n_initial) if trust_region else None,
             thesis=thesis,
         )
-        takes_noise = isinstance(self._surrogate, NoisySurrogate)
+        takes_noise = isinstance(model, NoisySurrogate)
         if noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
             raise InputError(
                 "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials ('gp', "
                 "'tgp', or an object with known_noise), without a thesis preset."
             )
-        self._straying = noise_while_exploring
         self._lattice = with_fixed(lattice, box, fixed)
+        self._model = ResponseModel(
+            model,
+            box,
+            straying=input_noise if noise_while_exploring else None,
+            lattice=self._lattice,
+            continues_chains=self._strategy.continues_chains,
+            seed=self.seed,
+        )
         rng = np.random.default_rng([self.seed, 0])
         rest = initial_design(design, max(self.n_initial - len(first), 1), box.dimension, rng)
         self._design = np.concatenate([first, rest])
         self._trials = Trials(box)
-        self._cache: tuple[int, Posterior] | None = None
 
     @staticmethod
     def default_n_initial(box: Box, variables: int | None = None) -> int:
@@ -309,7 +311,7 @@ class Optimizer:
             numbers,
         )
         if not trials.equal(self._trials):
-            self._cache = None
+            self._model.forget()
         self._trials = trials
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -410,7 +412,7 @@ class Optimizer:
         return position if unused(position) else next(filter(unused, range(self.n_initial)), position)
 
     def _propose(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        candidates = self._snapped(self._strategy.candidates(self._posterior(), self._history, rng))
+        candidates = self._snapped(self._strategy.candidates(self.posterior, self._history, rng))
         if self._ranking.noisy:
             return candidates[0]
         tried = np.concatenate([self._trials.commanded, self._trials.pending])
@@ -438,7 +440,7 @@ class Optimizer:
             raise unknown_name("place of the recommendation", where, ("observed", "box"))
         history, ranking = self._history, self._ranking
         with single_threaded():
-            posterior = self._posterior()
+            posterior = self.posterior
             if where == "observed":
                 index = int(ranking.order(posterior, history.tried, history.observed)[0])
                 u, observed = history.tried[index], float(history.observed[index])
@@ -460,7 +462,7 @@ class Optimizer:
                 int(self._trials.successful.sum()),
                 self._sign,
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
-                self._execution_noise(),
+                self._model.execution_noise,
             )
 
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -471,7 +473,7 @@ class Optimizer:
         U = np.atleast_2d(self.box.to_unit(X))
         perturbations = self._ranking.accurate if under_noise else Perturbations(exact(self.box.dimension))
         with single_threaded():
-            mean, variance = mixture(perturbations.outcome(self._posterior(), U))
+            mean, variance = mixture(perturbations.outcome(self.posterior, U))
         return self._sign * mean, np.sqrt(variance)
 
     def promise(self) -> float:
@@ -481,7 +483,7 @@ class Optimizer:
         find. Raises InputError if no trial has given a value yet.
         """
         with single_threaded():
-            return promise(self._ranking, self._posterior(), self._history, self._rng(4, len(self._trials)))
+            return promise(self._ranking, self.posterior, self._history, self._rng(4, len(self._trials)))
 
     def estimate_input_noise(self) -> InputNoise:
         """Return the input noise that the trials told so far show.
@@ -503,8 +505,7 @@ class Optimizer:
     @property
     def posterior(self) -> Posterior:
         """The surrogate conditioned on the trials told so far; inputs in the unit cube."""
-        with single_threaded():
-            return self._posterior()
+        return self._model.posterior(self._trials)
 
     def __repr__(self) -> str:
         parts = [f"{len(self._trials)} trials", f"{len(self._trials.pending)} pending"]
@@ -525,36 +526,6 @@ class Optimizer:
         return History(
             self._trials.places[told], self._trials.modelled[told], self._trials.reached[~told], self._trials.pending
         )
-
-    def _posterior(self) -> Posterior:
-        t = len(self._trials)
-        if not self._trials.successful.any():
-            raise InputError("no trial has given a value yet; tell the outcome of at least one.")
-        if self._cache is not None and self._cache[0] == t:
-            return self._cache[1]
-        continues = self._strategy.continues_chains
-        previous = self._cache[1] if continues and self._cache is not None else None
-        rng = self._rng(1, t if continues else 0)  # else one stream for all: what some trials taught stays as it was
-        if self._straying and self.input_noise is not None and isinstance(self._surrogate, NoisySurrogate):
-            roots = self.input_noise.unit_roots(self.box, self._trials.commanded).copy()
-            roots[self._trials.reported] = 0.0
-            posterior = condition_on_noisy_inputs(
-                self._surrogate, self._trials.reached, self._trials.modelled, roots, [self.seed, 1, 0]
-            )
-        else:
-            posterior = self._surrogate.condition(self._trials.reached, self._trials.modelled, rng, previous)
-        if self._lattice is not None:
-            posterior = LatticePosterior(posterior, self._lattice)
-        self._cache = (t, posterior)
-        return posterior
-
-    def _execution_noise(self) -> float | None:
-        """Return the variance of the observation noise of one execution; None is what the surrogate says.
-
-        What the surrogate learns from trials that strayed contains the input noise, which executions have anyway.
-        """
-        known = getattr(self._surrogate, "known_noise", None) if self._straying else None
-        return None if known is None else known**2
 
     def _snapped(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         return U if self._lattice is None else self._lattice.snap(U)

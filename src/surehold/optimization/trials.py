@@ -134,9 +134,11 @@ class Trials:
 
     @property
     def modelled(self) -> NDArray[np.float64]:
-        """Values with failed trials and outliers counted as the lowest other value, (t,); needs one value at least."""
+        """Values with failed trials and outliers counted as the lowest other value, (t,); NaN if every trial failed."""
         values = self.values
         sound = self.successful & ~self.outliers
+        if not sound.any():
+            return values
         return np.where(sound, values, values[sound].min())
 
     @property

@@ -8,7 +8,7 @@ from surehold.campaigns.problem_setup import build_problem, checked_problem
 from surehold.cli import run
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.problems import Grasp
+from surehold.problems import GraspProblem
 from surehold.problems.grasp.options import OPTIONS, THESIS_SIMULATOR, GraspOptions
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
@@ -39,7 +39,7 @@ def test_a_plan_takes_every_option_and_its_default_changes_nothing(name):
 
 @pytest.mark.parametrize(("name", "choice"), CHOSEN)
 def test_studies_and_plans_mean_what_python_means(name, choice):
-    expected = Grasp("bottle", **{name: choice})
+    expected = GraspProblem("bottle", **{name: choice})
     words = {"object": "bottle", name: choice}
     study = problem_of(StudySettings(SPACE, problem={"grasp": words}))
     plan = build_problem(ProblemSetup("grasp", 8, 5, {"collision": "penalty", **words}))
@@ -50,7 +50,7 @@ def test_studies_and_plans_mean_what_python_means(name, choice):
 
 def test_unknown_options_are_explained():
     with pytest.raises(InputError, match="option of a grasp 'contcat' is unknown; did you mean 'contact'"):
-        Grasp("bottle", contcat="single")
+        GraspProblem("bottle", contcat="single")
     with pytest.raises(InputError, match="did you mean 'contact'"):
         checked_problem("mine", ProblemSetup("grasp", 8, 5, {"contcat": "single"}))
 
@@ -66,11 +66,11 @@ def test_studies_that_are_older_than_the_record_are_read_as_before():
 @pytest.mark.parametrize(("name", "choice"), [c for c in CHOSEN if c[0] in THESIS_SIMULATOR])
 def test_what_contradicts_the_preset_is_refused(name, choice):
     if choice == THESIS_SIMULATOR[name]:
-        same = Grasp("bottle", preset="thesis", **{name: choice})
-        assert same._settings == Grasp("bottle", preset="thesis")._settings
+        same = GraspProblem("bottle", preset="thesis", **{name: choice})
+        assert same._settings == GraspProblem("bottle", preset="thesis")._settings
     else:
         with pytest.raises(InputError, match=f"preset 'thesis' sets {name} to"):
-            Grasp("bottle", preset="thesis", **{name: choice})
+            GraspProblem("bottle", preset="thesis", **{name: choice})
 
 
 def test_the_record_has_a_valid_default_and_a_help_for_each():
@@ -78,4 +78,4 @@ def test_the_record_has_a_valid_default_and_a_help_for_each():
         assert option.help.endswith("."), name
         assert not option.choices or option.default in option.choices, name
     assert set(GraspOptions.__annotations__) < set(OPTIONS)
-    assert np.array_equal(Grasp("bottle").box.names, OPTIONS["variables"].default)
+    assert np.array_equal(GraspProblem("bottle").box.names, OPTIONS["variables"].default)

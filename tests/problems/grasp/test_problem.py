@@ -6,7 +6,7 @@ import pytest
 from surehold.errors import InputError
 from surehold.grasping import MODES, GraspObject, Simulator, default_pose, shipped_object
 from surehold.grasping.object.solids import RoundedBox, triangles
-from surehold.problems import Grasp
+from surehold.problems import GraspProblem
 from surehold.problems.grasp.default_poses import GraspDefault, grasp_default, search_default
 from surehold.problems.grasp.options import VARIABLES
 from surehold.problems.problem import Problem
@@ -14,7 +14,7 @@ from surehold.problems.problem import Problem
 
 @pytest.fixture(scope="module")
 def mug():
-    return Grasp("mug", facet="right-front")
+    return GraspProblem("mug", facet="right-front")
 
 
 def test_default_problem_is_dx_and_dy_of_the_published_bounds(mug):
@@ -39,19 +39,19 @@ def test_value_is_the_quality_of_the_grasp(mug):
 
 def test_variables_in_any_subset_and_order_mean_the_same(mug):
     names = tuple(reversed(VARIABLES))
-    every = Grasp("mug", variables=names)
+    every = GraspProblem("mug", variables=names)
     assert every.box.names == names
     assert every.units == tuple(VARIABLES[name] for name in names)
     x = {"dx": -0.057, "dy": 0.002, "s1": mug.default.s1} | dict.fromkeys(["dz", "rx", "ry", "rz"], 0.0)
     assert every([x[name] for name in names]) == mug([-0.057, 0.002])
-    one = Grasp("mug", variables="dx", fixed={"dy": 0.002})
+    one = GraspProblem("mug", variables="dx", fixed={"dy": 0.002})
     assert one([-0.057]) == mug([-0.057, 0.002])
-    closer = Grasp("mug", variables=["dx", "dz"], fixed={"dy": 0.002})
+    closer = GraspProblem("mug", variables=["dx", "dz"], fixed={"dy": 0.002})
     assert closer([-0.057, -0.01]) != one([-0.057])
 
 
 def test_dz_spans_the_published_distances():
-    p = Grasp("mug", variables=("dz",))
+    p = GraspProblem("mug", variables=("dz",))
     depth = shipped_object("mug").box_half_extents[0]
     nearest, farthest = p.default.standoff - p.box.upper[0], p.default.standoff - p.box.lower[0]
     assert nearest == pytest.approx(depth / 3)
@@ -81,10 +81,10 @@ def test_pickled_problem_gives_the_same_and_is_small(mug):
 
 
 def test_options_reach_the_simulator():
-    p = Grasp("mug", contact="single", closing="synergy", friction=0.8)
+    p = GraspProblem("mug", contact="single", closing="synergy", friction=0.8)
     assert isinstance(p.simulator, Simulator)
     assert (p.simulator.contact, p.simulator.closing, p.simulator.friction) == ("single", "synergy", 0.8)
-    narrow = Grasp("mug", bounds={"dx": (-0.07, -0.05)})
+    narrow = GraspProblem("mug", bounds={"dx": (-0.07, -0.05)})
     np.testing.assert_allclose([narrow.box.lower[0], narrow.box.upper[0]], [-0.07, -0.05])
 
 
@@ -106,7 +106,7 @@ def test_options_reach_the_simulator():
 )
 def test_bad_options_are_explained(options, words):
     with pytest.raises(InputError, match=words):
-        Grasp(**options)
+        GraspProblem(**options)
 
 
 def test_bad_points_are_explained(mug):
@@ -119,18 +119,18 @@ def test_bad_points_are_explained(mug):
 
 
 def test_the_thesis_preset_is_the_original_experiment():
-    problem = Grasp("bottle", variables=("dx", "s1"), preset="thesis")
+    problem = GraspProblem("bottle", variables=("dx", "s1"), preset="thesis")
     assert (problem.simulator.contact, problem.simulator.quality) == ("single", "simox")
     assert (problem.simulator.closing, problem.simulator.collision) == ("synergy", "zero")
     assert problem.box.upper[1] == pytest.approx(np.pi)
     assert 0.1 < problem([-0.03, -0.7]) < 1.0
     with pytest.raises(InputError, match="preset 'theses' is unknown"):
-        Grasp("bottle", preset="theses")
+        GraspProblem("bottle", preset="theses")
 
 
 def test_the_default_facet_of_the_drill_has_a_grasp_that_holds():
-    drill = Grasp("drill")
-    assert (Grasp("mug").facet, drill.facet) == ("right-front", "bottom-front")
+    drill = GraspProblem("drill")
+    assert (GraspProblem("mug").facet, drill.facet) == ("right-front", "bottom-front")
     best = np.array([-0.018, -0.036])
     around = [drill(best + step) for step in 0.003 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])]
     assert drill(best) > 0.1
@@ -142,6 +142,6 @@ def test_an_object_of_own_solids_has_its_default_searched():
     vertices, faces, volume, center = triangles(solids)
     for name in ("block", "mug"):  # also under the name of a shipped one
         own = GraspObject(name, vertices, faces, 900.0 * volume, center, 0.5, solids)
-        problem = Grasp(own)
+        problem = GraspProblem(own)
         assert 0.02 / 3.0 - 1e-4 <= problem.default.standoff <= 0.04 + 1e-4
         assert problem.facet == "right-front"

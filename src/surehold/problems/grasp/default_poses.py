@@ -2,9 +2,9 @@
 
 For each object and mode the search tries standoffs s from h/3 to h + 20 mm (h the half extent of the object's box
 towards the hand) and thumb postures s1, and for each of them a grid of 15 x 7 offsets (dx, dy) over the bounds of
-`surehold.problems.Grasp`, with graded contacts and a soft touch of 3 mm, that counts what is firmly touched. Of the
-pairs that leave a third to two thirds of these poses free of collision it takes the one with the highest mean quality;
-without such a pair, of those nearest to that range.
+`surehold.problems.GraspProblem`, with graded contacts and a soft touch of 3 mm, that counts what is firmly touched. Of
+the pairs that leave a third to two thirds of these poses free of collision it takes the one with the highest mean
+quality; without such a pair, of those nearest to that range.
 The table holds what was found for the shipped objects, the left iCub hand and its power grasp; what is found for other
 hands and for meshes is kept in the cache folder.
 `python -m surehold.problems.grasp.default_poses` repeats the search for the shipped objects and prints the table below.

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.grasp import Grasp as GraspOutcome
+from surehold.grasping.grasp import Grasp
 from surehold.grasping.hand.synergy import preshape_of
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.shipped import shipped_object
@@ -28,7 +28,7 @@ from surehold.problems.grasp.default_poses import GraspDefault, default_facet, g
 from surehold.problems.grasp.options import OPTIONS, THESIS_SIMULATOR, VARIABLES, GraspOptions
 from surehold.problems.problem import checked_points
 
-__all__ = ["Grasp", "GraspProblem"]
+__all__ = ["GraspProblem"]
 
 
 class GraspProblem:
@@ -143,7 +143,7 @@ class GraspProblem:
         """Return the pose of the palm in the object's frame at x (d,)."""
         return self._pose(self._values(self._one(x)))
 
-    def grasp(self, x: ArrayLike) -> GraspOutcome:
+    def grasp(self, x: ArrayLike) -> Grasp:
         """Return the whole outcome of the trial at x (d,)."""
         values = self._values(self._one(x))
         return self.simulator.grasp(self._pose(values), values["s1"])
@@ -193,6 +193,3 @@ class GraspProblem:
 
     def __repr__(self) -> str:
         return f"<grasp {self.name}: {self._settings['contact']} contacts, {self.box!r}>"
-
-
-Grasp = GraspProblem  # its public name is surehold.problems.Grasp
