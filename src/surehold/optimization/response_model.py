@@ -1,0 +1,120 @@
+"""What the optimizer believes of the response: its surrogate, conditioned on the trials told so far."""
+
+from typing import Final
+
+import numpy as np
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+from surehold.optimization.lattice import Lattice, LatticePosterior
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.strategy.thesis import ThesisConstants
+from surehold.optimization.surrogates.gaussian_process.model import NoiseName
+from surehold.optimization.surrogates.named import refuse_settings, surrogate_named
+from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
+from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate
+from surehold.optimization.trials import Trials
+
+__all__ = ["ResponseModel", "chosen_surrogate"]
+
+
+def chosen_surrogate(
+    surrogate: str | Surrogate,
+    *,
+    preset: str | None,
+    thesis: ThesisConstants | None,
+    noise: float | NoiseName | None,
+    output_range: tuple[float, float] | None,
+    box: Box,
+    input_noise: InputNoise | None,
+    seed: int,
+) -> Surrogate:
+    """Return the surrogate that a name, an object or a thesis preset stands for.
+
+    Raises InputError for an unknown name, and for settings beside an object or a preset, which have their own.
+    """
+    deviations = np.zeros(box.dimension)
+    if input_noise is not None:
+        deviations = np.sqrt(np.diag(input_noise.unit_covariance(box)))
+    if not isinstance(surrogate, str):
+        refuse_settings("a surrogate object", noise, output_range)
+        return surrogate
+    if thesis is not None:
+        refuse_settings(f"preset='{preset}'", noise, output_range)
+        return thesis.surrogate(surrogate, deviations, seed)
+    return surrogate_named(surrogate, noise=noise, output_range=output_range, input_deviations=deviations, seed=seed)
+
+
+class ResponseModel:
+    """A surrogate and its posterior, which is computed once for each set of trials.
+
+    Parameters
+    ----------
+    surrogate, box, lattice, seed
+        As of the optimizer.
+    straying
+        The input noise of the trials themselves; None if they reach what is commanded.
+    continues_chains
+        Whether a posterior goes on from the one before, so that it depends on all those before it.
+    """
+
+    def __init__(
+        self,
+        surrogate: Surrogate,
+        box: Box,
+        *,
+        straying: InputNoise | None,
+        lattice: Lattice | None,
+        continues_chains: bool,
+        seed: int,
+    ):
+        self._surrogate: Final = surrogate
+        self._box: Final = box
+        self._straying: Final = straying
+        self._lattice: Final = lattice
+        self._continues_chains: Final = continues_chains
+        self._seed: Final = seed
+        self._cache: tuple[int, Posterior] | None = None
+
+    def forget(self) -> None:
+        """Drop the posterior: the trials are others from now on."""
+        self._cache = None
+
+    def posterior(self, trials: Trials) -> Posterior:
+        """Return the surrogate conditioned on the trials told so far; inputs in the unit cube.
+
+        Raises InputError if no trial has given a value yet.
+        """
+        t = len(trials)
+        if not trials.successful.any():
+            raise InputError("no trial has given a value yet; tell the outcome of at least one.")
+        if self._cache is not None and self._cache[0] == t:
+            return self._cache[1]
+        with single_threaded():
+            posterior = self._conditioned(trials)
+        if self._lattice is not None:
+            posterior = LatticePosterior(posterior, self._lattice)
+        self._cache = (t, posterior)
+        return posterior
+
+    def _conditioned(self, trials: Trials) -> Posterior:
+        if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
+            roots = self._straying.unit_roots(self._box, trials.commanded).copy()
+            roots[trials.reported] = 0.0
+            return condition_on_noisy_inputs(
+                self._surrogate, trials.reached, trials.modelled, roots, [self._seed, 1, 0]
+            )
+        # One random stream for all, so that what some trials taught stays as it was when others follow.
+        previous = self._cache[1] if self._continues_chains and self._cache is not None else None
+        rng = np.random.default_rng([self._seed, 1, len(trials) if self._continues_chains else 0])
+        return self._surrogate.condition(trials.reached, trials.modelled, rng, previous)
+
+    @property
+    def execution_noise(self) -> float | None:
+        """Variance of the observation noise of one execution; None is what the surrogate says.
+
+        What the surrogate learns from trials that strayed contains the input noise, which executions have anyway.
+        """
+        known = getattr(self._surrogate, "known_noise", None) if self._straying is not None else None
+        return None if known is None else known**2
