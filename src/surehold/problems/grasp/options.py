@@ -1,8 +1,9 @@
 """The options of a grasp: name, type, default, choices and help of each, once for all who read them.
 
 `GraspOptions` are the keyword options of `surehold.problems.GraspProblem`; `DescribedGrasp` adds what words need where
-Python has objects: the names or files of object and hand. The command line makes its options of this record,
-studies store a `DescribedGrasp`, and plans of campaigns name its keys as arguments. A new option is one line here, and what it does.
+Python has objects: the names or files of object and hand. The command line makes its options of this record, studies
+store a `DescribedGrasp`, and plans of campaigns name its keys as arguments. A new option is one line here, and what it
+does.
 """
 
 from collections.abc import Mapping, Sequence
