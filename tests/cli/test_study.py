@@ -247,7 +247,7 @@ def test_negative_numbers_and_ids(study):
     study("ask mug")
     study("tell mug 0 -1.5")
     study("add mug --at dx=-0.01,dy=-0.01 -2.5e-3")
-    assert study("status mug")["highest_value"] == -2.5e-3
+    assert study("status mug")["best_value"] == -2.5e-3
 
 
 def test_a_process_of_its_own(here):
@@ -268,7 +268,7 @@ def test_a_run_is_kept_and_resumed(study, here, capsys):
     assert (here / "runs" / "hill" / "report.html").exists()
     assert study("status hill")["complete"] == 7
     assert run([*OWN_RUN.split(), "--trials", "10"]) == 0
-    assert "Resuming study hill at trial 8" in capsys.readouterr().out
+    assert "Resuming study hill: 7 trials are done" in capsys.readouterr().out
     whole = "maximize own.py:hill --bounds x=0:1,y=0:1 --initial 5 --trials 10 --study whole --storage sqlite:///w.db"
     assert run(whole.split()) == 0
     values = [

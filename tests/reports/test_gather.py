@@ -6,6 +6,7 @@ from surehold.errors import InputError
 from surehold.optimization.surrogates.protocol import mixture
 from surehold.problems import GaussianBumps, robust_score
 from surehold.reports import gather
+from surehold.reports.surfaces import surfaces_of
 
 
 def test_answers_and_traces(gm_result, gm_report):
@@ -20,7 +21,7 @@ def test_answers_and_traces(gm_result, gm_report):
 
 
 def test_surfaces_are_the_model(gm_result, gm_report):
-    (view,) = gm_report.surfaces
+    view = gm_report.surfaces[0]
     corner = np.array([[view.axes[0][7], view.axes[1][50]]])
     mean, std = gm_result.optimizer.predict(corner)
     assert view.mean[7, 50] == pytest.approx(mean[0], rel=1e-9)
@@ -37,12 +38,15 @@ def test_three_variables_show_the_two_that_matter():
     noise = sh.InputNoise.unit(0.05)
     result = sh.maximize(p, box, 26, input_noise=noise, n_initial=20, seed=0)
     x = result.recommendation.x
-    (view,) = gather.surfaces_of(result.optimizer.posterior, box, noise, x)
+    view, close = surfaces_of(result.optimizer, noise, [x])
     assert view.variables == (1, 2)
     assert "a and b" in view.note
     assert view.axes[0][0] == -2.0
     point = [[x[0], view.axes[0][10], view.axes[1][30]]]
     assert view.mean[10, 30] == pytest.approx(result.optimizer.predict(point)[0][0], rel=1e-9)
+    for axis, k in zip(close.axes, close.variables, strict=True):  # five standard deviations to each side, in the box
+        sides = np.clip(x[k] + np.array([-0.25, 0.25]) * box.widths[k], box.lower[k], box.upper[k])
+        assert [axis[0], axis[-1]] == pytest.approx(sides)
 
 
 def test_failed_trials_leave_holes():

@@ -51,7 +51,7 @@ def test_the_page_says_what_happened(gm_report, gm_page):
     assert "was refused" in words
     assert "Highest observed refused" in words
     assert "Recommended holds" in words
-    assert f"{gm_report.highest.mean:.4f}" in words
+    assert f"{gm_report.observed.mean:.4f}" in words
     assert f"{gm_report.recommended.mean:.4f}" in words
     assert "seed 1" in words
     assert "Unscented mean" in words
@@ -89,7 +89,7 @@ def test_the_scene_is_there_and_can_be_left_out(gm_page, rkhs_report):
 def test_user_text_is_escaped(gm_report):
     evil = "</script><img src=x onerror=alert(1)>&\"'"
     candidates = tuple(replace(c, pose=evil, status=evil, details={evil: evil}) for c in gm_report.candidates)
-    meshes = tuple(replace(m, name=evil) for m in gm_report.highest.scene.meshes)
+    meshes = tuple(replace(m, name=evil) for m in gm_report.observed.scene.meshes)
     candidates = (replace(candidates[0], scene=replace(candidates[0].scene, meshes=meshes)), *candidates[1:])
     variables = (replace(gm_report.variables[0], name=evil), replace(gm_report.variables[1], name="$x_{$"))
     page = render(

@@ -478,7 +478,7 @@ def test_what_was_reached_outside_the_ranges_is_learnt_from_where_it_was(tmp_pat
     places = [{"dx": 0.0625, "force": 200.0}, {"dx": -0.0625, "n": 1.5}, {"dx": 0.01}]
     for place in places:
         robot.tell(robot.ask().id, -abs(place["dx"]), reached=place)
-    history = history_of(robot.trials(), space, True)
+    history = history_of(robot.trials(), space)
     assert history.reached[:, 0].tolist() == [0.0625, -0.0625, 0.01]
     assert history.reached[1, 1] == 1.5
     assert history.reached[0, 2] == pytest.approx(np.log(200.0))
@@ -490,7 +490,7 @@ def test_what_was_reached_outside_the_ranges_is_learnt_from_where_it_was(tmp_pat
     (tmp_path / "mug.csv").write_text(to_csv(robot))
     again = RobotStudy.create("again", settings, str(tmp_path / "again.log"))
     import_trials(again, trials_of_csv(str(tmp_path / "mug.csv"), {name: name for name in space.distributions}))
-    assert np.array_equal(history_of(again.trials(), space, True).reached, history.reached)
+    assert np.array_equal(history_of(again.trials(), space).reached, history.reached)
 
 
 @pytest.mark.parametrize(

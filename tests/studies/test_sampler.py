@@ -167,9 +167,9 @@ def test_parallel_threads_and_copies():
         study.optimize(lambda t: value({n: t._suggest(n, d) for n, d in SPACE.items()}), n_trials=16, n_jobs=4)
     assert len(study.trials) == 16
     assert all(t.state == TrialState.COMPLETE for t in study.trials)
-    expected = study.sampler.suggest(study.trials, 16, True)
+    expected = study.sampler.suggest(study.trials, 16, "maximize")
     for other in (pickle.loads(pickle.dumps(study.sampler)), copy.deepcopy(study.sampler)):
-        assert other.suggest(study.trials, 16, True) == expected
+        assert other.suggest(study.trials, 16, "maximize") == expected
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,8 @@ def application() -> typer.Typer:
     )
     app.command()(grasp)
     app.command()(scene)
-    app.command()(maximize)
+    for direction, extreme in (("maximize", "maximum"), ("minimize", "minimum")):
+        app.command(direction, help=f"Find a {extreme} that still holds when the input is off.")(maximize)
     app.command()(doctor)
     app.add_typer(campaigns(), name="campaign")
     app.add_typer(studies(), name="study")

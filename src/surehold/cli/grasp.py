@@ -127,7 +127,7 @@ def grasp(
             details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
             | physics,
             scene=replace(
-                gather.grasp_scene(grasp_scene(problem.simulator, outcome)), neighbors=neighbors_of(problem, candidate)
+                gather.drawn_scene(grasp_scene(problem.simulator, outcome)), neighbors=neighbors_of(problem, candidate)
             ),
         )
 

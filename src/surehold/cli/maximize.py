@@ -1,4 +1,4 @@
-"""`surehold maximize PROBLEM`: a synthetic function or the user's own."""
+"""`surehold maximize PROBLEM` and `surehold minimize PROBLEM`: a synthetic function or the user's own."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -41,6 +41,7 @@ OWN = Defaults(60, None, "0.03")
 
 
 def maximize(
+    context: typer.Context,
     problem: Annotated[
         str,
         typer.Argument(
@@ -65,8 +66,12 @@ def maximize(
     ] = False,
     open_report: Open = False,
 ) -> None:
-    """Find a maximum that still holds when the input is off."""
+    """Find a maximum that still holds when the input is off.
+
+    The command `minimize` is this one, too: the name by which it is called says which.
+    """
     checked_method(method)
+    direction = context.info_name or "maximize"
     chosen = problem_of(problem, bounds)
     defaults = defaults_of(problem)
     noise_text = defaults.noise if noise is None else noise
@@ -82,7 +87,7 @@ def maximize(
         start = min(defaults.initial or Optimizer.default_n_initial(chosen.box), budget)
     run_session(
         chosen,
-        title=f"Maximize {chosen.name}",
+        title=f"{direction.capitalize()} {chosen.name}",
         method=method,
         noise=input_noise,
         trials=budget,
@@ -92,6 +97,7 @@ def maximize(
         folder=folder_for(chosen.name, method, seed, out, study),
         open_report=open_report,
         settings={"problem": problem, "bounds": bounds or None, "input noise": noise_text},
+        direction=direction,
         tolerate_failures=tolerate_failures,
         kept=kept,
     )

@@ -61,7 +61,7 @@ def scene(
             with announced(console), shown_progress(f"{body.name}, {mode}", console) as progress:
                 problem = described_grasp({**described, "facet": mode}, body, progress)
             x, outcome, free = _best(problem)
-            drawn = gather.grasp_scene(grasp_scene(problem.simulator, outcome))
+            drawn = gather.drawn_scene(grasp_scene(problem.simulator, outcome))
             label = f"{body.name}, {mode}"
             views.append(Candidate(label, x, outcome.quality, scene=drawn))
             shares = f"{100.0 * free:.0f} % of {_ALONG * _ACROSS}"

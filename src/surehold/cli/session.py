@@ -85,13 +85,14 @@ def run_session(
     quality_name: str = "value",
     disturbance: str = "the input is off",
     tolerate_failures: bool = False,
+    direction: str = "maximize",
     success_above: float | None = None,
     outcomes: Callable[[Result], Mapping[str, int]] = lambda result: {},
     advice: str = "",
     kept: Kept | None = None,
     console: Console | None = None,
 ) -> RunReport:
-    """Maximize, score, write and show; Ctrl-C and SIGTERM keep what was done.
+    """Optimize, score, write and show; Ctrl-C and SIGTERM keep what was done.
 
     A run that is kept as a study is resumed where that exists.
 
@@ -125,6 +126,7 @@ def run_session(
             "n_initial": initial,
             "seed": seed,
             "preset": preset or None,
+            "direction": direction,
         }
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
@@ -161,6 +163,7 @@ def run_session(
                 settings={
                     **settings,
                     "method": method,
+                    "direction": direction,
                     "trials": trials,
                     "initial trials": initial,
                     "preset": preset or None,
@@ -225,16 +228,17 @@ def _as_study(
     logging.set_verbosity(logging.WARNING)
     optimizer = {name: options[name] for name in ("seed", "n_initial", "preset") if options[name] is not None}
     space = SearchSpace(problem.box)
-    settings = StudySettings(space, options["input_noise"], units, optimizer, kept.problem)
+    settings = StudySettings(space, options["input_noise"], units, optimizer, kept.problem, options["direction"])
     storage = kept.storage or os.environ.get("SUREHOLD_STORAGE", "")
     study = RobotStudy.create(kept.study, settings, storage, resume=True)
     if study.paused is not None:
         raise InputError(f"study '{study.name}' is paused ({study.paused}); resume it with: surehold study resume.")
     done = len(study.trials())
     if done:
-        console.print(f"Resuming study {study.name} at trial {done + 1}.", markup=False)
+        console.print(f"Resuming study {study.name}: {done} trials are done.", markup=False)
     study.set_stop_rule(StopRule(trials=trials))
     interrupted = False
+    best = min if options["direction"] == "minimize" else max
     with _progress(trials, options, console) as show:
 
         def told(*_: Any) -> None:
@@ -242,7 +246,7 @@ def _as_study(
             values = [t.values[0] for t in finished if t.values]
             modelled = values and len(finished) >= options["n_initial"]
             robust = study.recommend(write=False).mean if modelled else None
-            show(len(finished), max(values, default=np.nan), robust)
+            show(len(finished), best(values, default=np.nan), robust)
 
         try:
             work(study, trial_function(problem, space), after=told)
@@ -260,12 +264,13 @@ def _as_study(
 def _progress(
     trials: int, options: dict[str, Any], console: Console
 ) -> Iterator[Callable[[int, float, float | None], None]]:
-    """Show progress; yields what is told (trials done, highest value, value of the recommendation)."""
+    """Show progress; yields what is told (trials done, best value, value of the recommendation)."""
+    extreme = "lowest" if options["direction"] == "minimize" else "highest"
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=None),
         MofNCompleteColumn(),
-        TextColumn("highest [bold]{task.fields[best]}[/bold]"),
+        TextColumn(f"{extreme} [bold]{{task.fields[best]}}[/bold]"),
         TextColumn("{task.fields[robust]}"),
         TimeElapsedColumn(),
     )
@@ -279,7 +284,7 @@ def _progress(
             phase = "initial design" if done < options["n_initial"] else "optimizing"
             progress.update(task, completed=done, description=phase, best=number(best), robust=robust)
             if not console.is_terminal and done % 10 == 0:
-                console.print(f"trial {done} of {trials}: highest {number(best)} {robust}".rstrip())
+                console.print(f"{done} of {trials} trials: {extreme} {number(best)} {robust}".rstrip())
 
         yield show
 
@@ -289,7 +294,7 @@ def _failures(result: Result) -> list[str]:
     if not failed:
         return []
     first = failed[0]
-    return [f"{len(failed)} of {len(result.y)} trials failed; the first, trial {first.index + 1}: {first.failure}"]
+    return [f"{len(failed)} of {len(result.y)} trials failed; the first, trial {first.index}: {first.failure}"]
 
 
 def _show(report: RunReport, path: Path, seconds: float, console: Console) -> None:
@@ -297,7 +302,7 @@ def _show(report: RunReport, path: Path, seconds: float, console: Console) -> No
     table.add_column("")
     for candidate in report.candidates:
         alone = len(report.candidates) == 1
-        table.add_column("highest observed = recommended" if alone else candidate.label, overflow="fold")
+        table.add_column(f"{report.extreme} observed = recommended" if alone else candidate.label, overflow="fold")
     for name, cells in page.table_rows(report):
         table.add_row(_plain(name), *(_plain(cell) for cell in cells))
     told = verdict(report)

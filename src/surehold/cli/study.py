@@ -67,10 +67,11 @@ def create(
         str, typer.Option(help="Of the values: none, inferred, heteroscedastic, or a standard deviation.")
     ] = "none",
     preset: Annotated[str, typer.Option(help="Settings by name, such as thesis.", show_default=False)] = "",
+    direction: Annotated[str, typer.Option(help="Of the values: maximize or minimize.")] = "maximize",
     storage: Storage = "",
     as_json: Json = False,
 ) -> None:
-    """Create a study; values are maximized."""
+    """Create a study."""
     from surehold.cli.options import noise_of
     from surehold.studies.parameter_text import parse_assignments
     from surehold.studies.robot import RobotStudy
@@ -86,7 +87,7 @@ def create(
     if space.numbers is None:
         input_noise = None  # choices carry none
     settings = StudySettings(
-        space, input_noise, parse_assignments(units, "--units") if units else {}, optimizer, described
+        space, input_noise, parse_assignments(units, "--units") if units else {}, optimizer, described, direction
     )
     quiet()
     study = RobotStudy.create(name, settings, storage)
@@ -123,7 +124,7 @@ def ask(
 def tell(
     name: Name,
     id: Annotated[int, typer.Argument(help="Of the trial, as ask printed it.")],
-    value: Annotated[str | None, typer.Argument(help="Outcome, larger is better.", show_default=False)] = None,
+    value: Annotated[str | None, typer.Argument(help="Outcome.", show_default=False)] = None,
     failed: Annotated[bool, typer.Option("--failed", help="The trial gave nothing.")] = False,
     reached: Annotated[
         str, typer.Option(help="What was truly reached, where it differs: NAME=VALUE,...", show_default=False)
@@ -162,8 +163,9 @@ def status(name: Name, storage: Storage = "", as_json: Json = False) -> None:
         f"  {found['trials']} trials: {found['complete']} complete, {found['failed']} failed, "
         f"{found['running']} running, {found['waiting']} waiting",
     ]
-    if found["highest_value"] is not None:
-        lines.append(f"  highest value {found['highest_value']:.6g} (trial {found['highest_trial']})")
+    if found["best_value"] is not None:
+        extreme = "highest" if found["direction"] == "maximize" else "lowest"
+        lines.append(f"  {extreme} value {found['best_value']:.6g} (trial {found['best_trial']})")
     for pending in found["pending"]:
         age = "" if pending["seconds"] is None else f", {pending['seconds']:.0f} s"
         who = f", {pending['worker']}" if pending["worker"] else ""

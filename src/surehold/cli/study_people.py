@@ -129,7 +129,7 @@ def import_trials(
     if file:
         found = warm_start.trials_of_csv(file, names, value)
     else:
-        found = warm_start.trials_of_study(warm_start.former_study(study, source), names)
+        found = warm_start.trials_of_study(warm_start.former_study(study, source), names, target.settings.direction)
     left_out = warm_start.import_trials(target, found, skip_bad=skip_bad)
     count = len(found) - len(left_out)
     lines = [f"{count} trial{'s' * (count != 1)} imported into {name}", *(f"left out: {why}" for why in left_out)]

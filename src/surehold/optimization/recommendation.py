@@ -7,6 +7,7 @@ Two distributions, both mixtures of normals:
                   noise; what is left of its spread is what the model does not know
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.surrogates.protocol import Posterior
 
-__all__ = ["Outcome", "Recommendation", "execution_at", "expectation_at", "recommendation"]
+__all__ = ["Outcome", "Recommendation", "execution_at", "expectation_at", "outliers_in_words", "recommendation"]
 
 _LEVEL: Final = 0.05
 
@@ -111,6 +112,18 @@ class Recommendation:
     def probability_below(self, value: float) -> float:
         """Return the probability that the next execution gives less than `value`."""
         return self.execution.probability_below(value)
+
+
+def outliers_in_words(numbers: Sequence[int]) -> str:
+    """Return what a user should know of trials that are `Recommendation.outliers`; empty where there are none."""
+    if not numbers:
+        return ""
+    several = len(numbers) > 1
+    return (
+        f"{'Trials' if several else 'Trial'} {', '.join(map(str, numbers))} gave {'values' if several else 'a value'} "
+        f"so far on the bad side of all others that {'they count' if several else 'it counts'} as failed; tell a trial "
+        "that gave no measurement as failed instead of with a penalty."
+    )
 
 
 def execution_at(

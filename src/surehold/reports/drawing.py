@@ -54,7 +54,7 @@ def style(salt: str) -> Iterator[None]:
 
 
 def _role(report: RunReport, candidate: Candidate) -> str:
-    return "high" if candidate is report.highest and len(report.candidates) > 1 else "answer"
+    return "high" if candidate is report.observed and len(report.candidates) > 1 else "answer"
 
 
 def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
@@ -87,6 +87,7 @@ def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
     axes.set_ylim(0.0, 1.18 * tallest)
     axes.set_xlabel(f"{report.quality_name} (◆ mean {number(candidate.mean)})")
     axes.set_ylabel("re-queries")
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=5))  # more would overlap where numbers are long
     axes.yaxis.set_major_locator(MaxNLocator(nbins=3, integer=True))
 
 
@@ -197,17 +198,18 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
             zorder=6,
             label=candidate.label,
         )
-    everything = np.concatenate([view.mean, report.y[ok]])
+    inside = ok & (report.X[:, i] >= view.axes[0][0]) & (report.X[:, i] <= view.axes[0][-1])
+    everything = np.concatenate([view.mean, report.y[inside]])
     margin = 0.25 * (everything.max() - everything.min()) or 1.0
     axes.set(xlabel=variable.label, ylabel=report.quality_name, xlim=(t[0], t[-1]))
     axes.set_ylim(everything.min() - margin, everything.max() + margin)
-    axes.legend(fontsize=8, loc="best")
+    _legend_above(axes)
     axes.set_title("Model and trials")
 
 
 def draw_trace(axes: "Axes", report: RunReport) -> None:
     """Draw best and robust value by trial, over the values of the single trials."""
-    k = np.arange(1, report.y.size + 1)
+    k = np.arange(report.y.size)
     axes.plot(k, report.y, "o", color=PALETTE["muted"], markersize=2.8, alpha=0.7, label="trial")
     failed = report.failed
     if failed.any():
@@ -215,7 +217,9 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
         axes.plot(
             k[failed], np.full(failed.sum(), floor), "x", color=PALETTE["muted"], markersize=5, label="failed trial"
         )
-    axes.step(k, report.best_trace, where="post", color=PALETTE["high"], linewidth=1.8, label="highest value so far")
+    axes.step(
+        k, report.best_trace, where="post", color=PALETTE["high"], linewidth=1.8, label=f"{report.extreme} value so far"
+    )
     if report.robust_trace is not None and np.isfinite(report.robust_trace).any():
         axes.plot(
             k,
@@ -225,10 +229,10 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             label="recommended: expected under the noise",
         )
     if 0 < report.n_initial < report.y.size:
-        axes.axvspan(0.5, report.n_initial + 0.5, color=PALETTE["grid"], alpha=0.45, linewidth=0, zorder=0)
+        axes.axvspan(-0.5, report.n_initial - 0.5, color=PALETTE["grid"], alpha=0.45, linewidth=0, zorder=0)
         axes.annotate(
             "initial design",
-            (report.n_initial / 2 + 0.5, 1.0),
+            (report.n_initial / 2 - 0.5, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, -3),
             textcoords="offset points",
@@ -238,10 +242,16 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             color=PALETTE["muted"],
         )
     axes.margins(y=0.12)
-    axes.set(xlabel="trial", ylabel=report.quality_name, xlim=(0.5, max(report.y.size + 0.5, 1.6)))
+    axes.set(xlabel="trial, from 0", ylabel=report.quality_name, xlim=(-0.5, max(report.y.size - 0.5, 0.6)))
     axes.grid(axis="y", linewidth=0.6)
     axes.set_axisbelow(True)
-    axes.figure.legend(loc="outside upper left", ncols=2, fontsize=8.5, borderaxespad=0.2)  # pyright: ignore[reportAttributeAccessIssue]
+    _legend_above(axes)
+
+
+def _legend_above(axes: "Axes") -> None:
+    """Put the legend beside what is drawn, never on it."""
+    handles, labels = axes.get_legend_handles_labels()
+    axes.figure.legend(handles, labels, loc="outside upper left", ncols=2, fontsize=8.5, borderaxespad=0.2)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def _edge(ticks: np.ndarray, end: int) -> float:

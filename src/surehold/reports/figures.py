@@ -54,7 +54,7 @@ def shake_name(candidate: Candidate) -> str:
 def surface_names(report: RunReport, index: int) -> dict[bool, str]:
     """Return the names of the figures of a surface: of the model, and (True) of its average over the input noise."""
     view = report.surfaces[index]
-    end = f"_{index + 1}" if len(report.surfaces) > 1 else ""
+    end = "_close" if index else ""
     if len(view.variables) == 1:
         return {False: f"surface{end}"}  # one figure shows both lines
     names = {False: f"surface_mean{end}"}

@@ -1,4 +1,4 @@
-"""From a finished run to the data of its report: candidates, traces, and the model over one or two variables."""
+"""From a finished run to the data of its report: candidates, traces, and scenes."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -11,8 +11,7 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.maximization import Result
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.surrogates.protocol import Posterior, mixture
+from surehold.optimization.recommendation import outliers_in_words
 from surehold.problems.perturbation import RobustScore
 from surehold.reports.run_report import (
     Candidate,
@@ -21,26 +20,26 @@ from surehold.reports.run_report import (
     RunReport,
     Scene,
     SceneMesh,
-    Surface,
     Variable,
 )
+from surehold.reports.surfaces import surfaces_of
 
 if TYPE_CHECKING:
     from surehold.grasping.pictures.scene import Scene as GraspScene
 
-__all__ = ["answers", "candidate", "grasp_scene", "report_of", "surfaces_of"]
+__all__ = ["answers", "candidate", "drawn_scene", "report_of"]
 
 _OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
-_LINE, _SQUARE = 301, 81  # grid points along a line, and along each side of a square
 
 
 def answers(result: Result) -> dict[str, int]:
-    """Return the trials to show by label, "highest observed" and "recommended"; one entry if they are the same."""
+    """Return the trials to show by label, the best "observed" and "recommended"; one entry if they are the same."""
     highest = result.best_index
     recommended = int(np.argmin(np.abs(result.optimizer.box.to_unit(result.X) - _unit_answer(result)).max(axis=1)))
     if recommended == highest or np.array_equal(result.X[recommended], result.X[highest]):
         return {"recommended": highest}
-    return {"highest observed": highest, "recommended": recommended}
+    extreme = "lowest" if result.optimizer.direction == "minimize" else "highest"
+    return {f"{extreme} observed": highest, "recommended": recommended}
 
 
 def candidate(
@@ -66,10 +65,12 @@ def candidate(
         0 if score is None else score.n_failed,
         None if told is None or score is None else told.mean,
         None if told is None or score is None else told.std,
+        None if told is None or score is None else told.expectation.std,
         status,
         pose,
         details or {},
         scene,
+        minimized=result.optimizer.direction == "minimize",
     )
 
 
@@ -124,7 +125,7 @@ def report_of(
         for name, lower, upper in zip(box.names, box.lower, box.upper, strict=True)
         if name not in hidden
     )
-    y = result.y
+    y, minimized = result.y, optimizer.direction == "minimize"
     robust = np.full(y.size, np.nan)
     for trial in result.trials:
         if trial.recommendation is not None and trial.index < y.size and optimizer.input_noise is not None:
@@ -135,7 +136,7 @@ def report_of(
         X=result.X[:, shown],
         y=y,
         n_initial=optimizer.n_initial,
-        best_trace=_running_maximum(y),
+        best_trace=_running_best(y, minimized),
         candidates=tuple(
             replace(
                 candidate,
@@ -152,15 +153,16 @@ def report_of(
         success_above=success_above,
         outcomes=outcomes or {},
         advice=advice,
-        surfaces=surfaces_of(optimizer.posterior, box, noise, candidates[-1].x, shown),
+        surfaces=surfaces_of(optimizer, noise, [c.x for c in candidates], shown),
         interrupted=result.interrupted,
         planned_trials=planned_trials,
-        notes=tuple(notes),
+        notes=(*notes, *filter(None, [outliers_in_words(result.recommendation.outliers)])),
         choices=choices or {},
+        minimized=minimized,
     )
 
 
-def grasp_scene(scene: "GraspScene") -> Scene:
+def drawn_scene(scene: "GraspScene") -> Scene:
     """Return a grasp's scene as the page draws it: the object see-through, the links that touch in another color."""
     thing = scene.object
     object_mesh = SceneMesh("object", thing.vertices, thing.faces, _OBJECT, see_through=True, poses=thing.poses)
@@ -175,77 +177,14 @@ def grasp_scene(scene: "GraspScene") -> Scene:
     return Scene((object_mesh, *hand), contacts, box)
 
 
-def surfaces_of(
-    posterior: Posterior,
-    box: Box,
-    noise: InputNoise | None,
-    x: NDArray[np.floating],
-    shown: Sequence[int] | None = None,
-) -> tuple[Surface, ...]:
-    """Return the model over one or two of the variables that are shown (by default all), a slice through x if d > 2.
-
-    Where more than two are shown it is over the two most important ones: a variable matters as much as the posterior
-    mean varies along it through x.
-    """
-    center = np.clip(box.to_unit(x), 0.0, 1.0)
-    among = list(range(box.dimension) if shown is None else shown)
-    if not among:
-        return ()
-    over = sorted(_most_important(posterior, center, among)) if len(among) > 2 else among
-    note = ""
-    if len(over) < box.dimension:
-        note = f"slice through the recommended point over {' and '.join(box.names[k] for k in over)}"
-    if len(among) > 2:
-        note += ", the two that matter most"
-    surface = _surface(posterior, box, noise, center, tuple(over), _LINE if len(over) == 1 else _SQUARE, note)
-    return (replace(surface, variables=tuple(among.index(k) for k in over)),)
-
-
-def _surface(
-    posterior: Posterior,
-    box: Box,
-    noise: InputNoise | None,
-    center: NDArray[np.float64],
-    variables: tuple[int, ...],
-    points: int,
-    note: str,
-) -> Surface:
-    line = np.linspace(0.0, 1.0, points)
-    shape = (points,) * len(variables)
-    queries = np.tile(center, (points ** len(variables), 1))
-    for k, grid in zip(variables, np.meshgrid(*[line] * len(variables), indexing="ij"), strict=True):
-        queries[:, k] = grid.ravel()
-    mean, variance = mixture(posterior.moments(queries))
-    robust_mean = robust_std = None
-    if noise is not None:
-        averaged, spread = mixture(Perturbations.of(noise, box, "unscented").outcome(posterior, queries))
-        robust_mean, robust_std = averaged.reshape(shape), np.sqrt(spread).reshape(shape)
-    axes = tuple(box.lower[k] + line * box.widths[k] for k in variables)
-    return Surface(
-        variables, axes, mean.reshape(shape), robust_mean, np.sqrt(variance).reshape(shape), robust_std, note
-    )
-
-
 def _covariance_at(noise: InputNoise, box: Box, x: NDArray[np.floating]) -> NDArray[np.float64]:
     """Return the covariance (d, d) of the noise at x, in the units of the box."""
     return noise.unit_covariance(box, x) * np.outer(box.widths, box.widths)
-
-
-def _most_important(posterior: Posterior, center: NDArray[np.float64], among: Sequence[int]) -> list[int]:
-    line = np.linspace(0.0, 1.0, 41)
-    variation = []
-    for k in among:
-        queries = np.tile(center, (line.size, 1))
-        queries[:, k] = line
-        variation.append(float(np.var(mixture(posterior.moments(queries))[0])))
-    order = np.argsort(-np.array(variation), kind="stable")
-    return [among[i] for i in order[:2]]
 
 
 def _unit_answer(result: Result) -> NDArray[np.float64]:
     return result.optimizer.box.to_unit(result.recommendation.x)
 
 
-def _running_maximum(y: NDArray[np.float64]) -> NDArray[np.float64]:
-    best = np.maximum.accumulate(np.where(np.isfinite(y), y, -np.inf))
-    return np.where(np.isfinite(best), best, np.nan)
+def _running_best(y: NDArray[np.float64], minimized: bool) -> NDArray[np.float64]:
+    return (np.fmin if minimized else np.fmax).accumulate(y)

@@ -16,25 +16,24 @@ _HIGHEST, _ANSWER, _TRIAL = "#d1495b", "#2a7f62", "#5b6573"
 def interactive_plots(report: RunReport) -> dict[str, str]:
     """Return plots by name as JSON {data, layout}: progress, the model, and its average over the input noise."""
     plots = {"surehold-1-progress": _progress(report)}
-    for i, surface in enumerate(report.surfaces):
-        end = f"-{i + 1}" if len(report.surfaces) > 1 else ""
+    for surface in report.surfaces[:1]:  # a person can zoom into it
         if len(surface.variables) == 1:
-            plots[f"surehold-2-model{end}"] = _line(report, surface)
+            plots["surehold-2-model"] = _line(report, surface)
             continue
-        plots[f"surehold-2-model{end}"] = _map(
+        plots["surehold-2-model"] = _map(
             report, surface, surface.mean, "Model: expected value where the input is exact"
         )
         if surface.robust_mean is not None:
             title = "Model under the input noise (unscented mean)"
-            plots[f"surehold-3-under-noise{end}"] = _map(report, surface, surface.robust_mean, title)
+            plots["surehold-3-under-noise"] = _map(report, surface, surface.robust_mean, title)
     return {name: json.dumps(plot, allow_nan=False) for name, plot in plots.items()}
 
 
 def _progress(report: RunReport) -> dict[str, Any]:
-    number = np.arange(1, report.y.size + 1)
+    number = np.arange(report.y.size)
     data = [
         _points(number, report.y, "trial", {"color": _TRIAL, "size": 6}),
-        _curve(number, report.best_trace, "highest observed", _HIGHEST, shape="hv"),
+        _curve(number, report.best_trace, f"{report.extreme} observed", _HIGHEST, shape="hv"),
     ]
     if report.robust_trace is not None:
         known = np.isfinite(report.robust_trace)
@@ -43,7 +42,7 @@ def _progress(report: RunReport) -> dict[str, Any]:
                 number[known], report.robust_trace[known], "recommended, expected under the noise", _ANSWER, shape="hv"
             )
         )
-    return _plot("Highest observed and robust value", data, "trial", report.quality_name)
+    return _plot(f"{report.extreme.capitalize()} observed and robust value", data, "trial", report.quality_name)
 
 
 def _line(report: RunReport, surface: Surface) -> dict[str, Any]:
@@ -91,8 +90,8 @@ def _map(report: RunReport, surface: Surface, values: NDArray[np.floating], titl
 
 def _candidates(report: RunReport) -> list[tuple[NDArray[np.floating], NDArray[np.floating], str, str]]:
     found = [(report.recommended, "recommended", _ANSWER)]
-    if report.highest is not report.recommended:
-        found.insert(0, (report.highest, "highest observed", _HIGHEST))
+    if report.observed is not report.recommended:
+        found.insert(0, (report.observed, f"{report.extreme} observed", _HIGHEST))
     return [(c.x, np.array([c.quality]), name, color) for c, name, color in found]
 
 

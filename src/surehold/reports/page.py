@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from surehold.reports import figures
+from surehold.reports.glossary import glossary
 from surehold.reports.run_report import Candidate, RunReport, Scene
 from surehold.reports.scene import scene_data
 from surehold.reports.verdict import change, coordinates, halved, number, verdict
@@ -56,6 +57,7 @@ def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
             maps=[_map(report, i, drawings) for i in range(len(report.surfaces))],
             trace=Markup(figures.inline_svg(drawings["trace"], "trace", "Best and robust value by trial")),
             rows=table_rows(report),
+            words=glossary(report),
             settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
             trials=_trials(report),
             **scene_context(shown, [_scene_note(c) for c in shown], [_label(report, c) for c in shown]),
@@ -122,10 +124,10 @@ def _vendored(name: str) -> str:
 
 def _label(report: RunReport, candidate: Candidate) -> dict[str, str]:
     alone = len(report.candidates) == 1
-    role = "high" if candidate is report.highest and not alone else "answer"
-    text = "Highest observed = recommended" if alone else candidate.label.capitalize()
+    role = "high" if candidate is report.observed and not alone else "answer"
+    text = f"{report.extreme.capitalize()} observed = recommended" if alone else candidate.label.capitalize()
     if not report.succeeded:
-        role, text = "high", f"No success: {'the highest trial' if alone else candidate.label}"
+        role, text = "high", f"No success: {f'the {report.extreme} trial' if alone else candidate.label}"
     return {"role": role, "mark": "▲" if role == "high" else "●", "text": text}
 
 
@@ -217,31 +219,28 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
         rows.append(row("pose", lambda c: c.pose or "–"))
     if any(c.status for c in every):
         rows.append(row("status", lambda c: c.status or "–"))
-    rows.append(row("trial", lambda c: "–" if c.trial is None else str(c.trial + 1)))
+    rows.append(row("trial, from 0", lambda c: "–" if c.trial is None else str(c.trial)))
     rows.append(row(f"{report.quality_name}, hit exactly", lambda c: number(c.quality, 4)))
     if any(c.values.size for c in every):
         n = max(c.values.size + c.n_failed for c in every)
         rows.append(row(f"mean of {n} perturbed re-queries", lambda c: number(c.mean, 4)))
-        rows.append(row("5 % quantile of them", lambda c: number(c.low, 4)))
+        rows.append(row("95 % of them are better than", lambda c: number(c.bad, 4)))
         rows.append(row("worst of them", lambda c: number(c.worst, 4)))
         rows.append(row("standard deviation", lambda c: number(c.std, 3)))
         if any(c.n_failed for c in every):
             rows.append(row("re-queries without value", lambda c: str(c.n_failed)))
     if any(c.predicted_mean is not None for c in every):
-        rows.append(
-            row(
-                "expected by the model under the noise",
-                lambda c: (
-                    "–"
-                    if c.predicted_mean is None
-                    else number(c.predicted_mean, 4)
-                    + (f" ± {number(c.predicted_std, 2)}" if c.predicted_std is not None else "")
-                ),
-            )
-        )
+        rows.append(row("model: mean under the noise ± its uncertainty", lambda c: _expected(c, c.predicted_error)))
+        rows.append(row("model: one execution ± standard deviation", lambda c: _expected(c, c.predicted_std)))
     names = dict.fromkeys(name for c in every for name in c.details)
     rows.extend(row(name, lambda c, name=name: c.details.get(name, "–")) for name in names)
     return rows
+
+
+def _expected(candidate: Candidate, deviation: float | None) -> str:
+    if candidate.predicted_mean is None or deviation is None:
+        return "–"
+    return f"{number(candidate.predicted_mean, 4)} ± {number(deviation, 2)}"
 
 
 def _setting(value: Any) -> str:
@@ -257,8 +256,8 @@ def _trials(report: RunReport) -> list[dict[str, Any]]:
     rows = []
     for i, (x, y) in enumerate(zip(report.X * factors, report.y, strict=True)):
         notes, style = (["initial"] if i < report.n_initial else []), ""
-        if report.highest.trial == i:
-            notes.append("highest observed")
+        if report.observed.trial == i:
+            notes.append(f"{report.extreme} observed")
             style = "best"
         if report.recommended.trial == i:
             notes.append("recommended")
@@ -266,7 +265,7 @@ def _trials(report: RunReport) -> list[dict[str, Any]]:
         failed = not np.isfinite(y)
         rows.append(
             {
-                "number": i + 1,
+                "number": i,
                 "x": [number(float(v), 4) for v in x],
                 "choices": [texts[i] for texts in report.choices.values()],
                 "y": "failed" if failed else number(float(y), 4),

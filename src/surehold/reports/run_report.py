@@ -106,7 +106,7 @@ class Scene:
 class Candidate:
     """An answer that the run offers, and what became of it when it was re-queried with perturbed inputs."""
 
-    label: str  #: "highest observed" or "recommended"
+    label: str  #: "highest observed" ("lowest observed" where values are minimized) or "recommended"
     x: Floats  #: (d,) in the units of the box
     quality: float  #: value of the trial at x, undisturbed
     trial: int | None = None  #: index of that trial, from 0
@@ -114,12 +114,14 @@ class Candidate:
     points: Floats = field(default_factory=lambda: np.empty((0, 0)))  #: (q + failed, d) where they were made
     n_failed: int = 0  #: re-queries that gave no value
     predicted_mean: float | None = None  #: what the model expects under the noise
-    predicted_std: float | None = None
+    predicted_std: float | None = None  #: standard deviation of one execution
+    predicted_error: float | None = None  #: standard deviation of what the model does not know of that mean
     status: str = ""  #: of a grasp, such as "ok" or "no contact"
     pose: str = ""  #: pose and posture in words
     details: Mapping[str, str] = field(default_factory=dict)  #: further lines of the table
     scene: Scene | None = None
     noise: Floats | None = None  #: (d, d) covariance of the input noise at x, in the units of the box
+    minimized: bool = False  #: whether lower values are better
 
     @property
     def mean(self) -> float:
@@ -134,14 +136,16 @@ class Candidate:
         return float(np.std(self.values, ddof=1)) if self.values.size > 1 else 0.0
 
     @property
-    def low(self) -> float:
-        """5 % quantile of the re-queries; NaN if there are none."""
-        return float(np.quantile(self.values, 0.05)) if self.values.size else float("nan")
+    def bad(self) -> float:
+        """The value that 95 % of the re-queries are better than; NaN if there are none."""
+        return float(np.quantile(self.values, 0.95 if self.minimized else 0.05)) if self.values.size else float("nan")
 
     @property
     def worst(self) -> float:
-        """Lowest of the re-queries; NaN if there are none."""
-        return float(np.min(self.values)) if self.values.size else float("nan")
+        """The worst of the re-queries; NaN if there are none."""
+        if self.values.size == 0:
+            return float("nan")
+        return float(np.max(self.values) if self.minimized else np.min(self.values))
 
 
 @dataclass(frozen=True)
@@ -166,8 +170,8 @@ class RunReport:
     X: Floats  #: (n, d) trials, in the units of the box
     y: Floats  #: (n,) values; NaN where the trial failed
     n_initial: int
-    best_trace: Floats  #: (n,) highest value so far; NaN while there is none
-    candidates: tuple[Candidate, ...]  #: highest observed first, recommended last; one if they are the same trial
+    best_trace: Floats  #: (n,) best value so far; NaN while there is none
+    candidates: tuple[Candidate, ...]  #: best observed first, recommended last; one if they are the same trial
     settings: Mapping[str, Any]
     seed: int
     quality_name: str = "value"
@@ -181,6 +185,7 @@ class RunReport:
     planned_trials: int | None = None
     notes: tuple[str, ...] = ()
     choices: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: parameters that are no numbers: (n,) each
+    minimized: bool = False  #: whether lower values are better
 
     def __post_init__(self):
         n, d = self.y.size, len(self.variables)
@@ -214,9 +219,14 @@ class RunReport:
         return ~np.isfinite(self.y)
 
     @property
-    def highest(self) -> Candidate:
-        """The highest trial observed."""
+    def observed(self) -> Candidate:
+        """The best trial observed."""
         return self.candidates[0]
+
+    @property
+    def extreme(self) -> str:
+        """What the best value observed is: "highest" or "lowest"."""
+        return "lowest" if self.minimized else "highest"
 
     @property
     def recommended(self) -> Candidate:

@@ -49,7 +49,9 @@ def coordinates(report: RunReport, candidate: Candidate) -> str:
 
 def verdict(report: RunReport) -> Verdict:
     """Return headline and paragraph for a run."""
-    highest, answer = report.highest, report.recommended
+    highest, answer = report.observed, report.recommended
+    extreme, peak = report.extreme, "lowest dip" if report.minimized else "highest peak"
+    falls = "rises" if report.minimized else "falls"
     name, off = report.quality_name, report.disturbance
     told = report.y[~report.failed]
     if not report.succeeded:
@@ -77,24 +79,24 @@ def verdict(report: RunReport) -> Verdict:
         )
     if len(report.candidates) == 1:
         if report.robust_trace is None:
-            why = f"The method looks for the highest value and does not ask what happens when {off}."
+            why = f"The method looks for the {extreme} value and does not ask what happens when {off}."
         else:
             why = "The model expects no other trial to hold better."
         return Verdict(
-            f"The highest trial is also the recommended one: {number(answer.quality)} when hit exactly, "
+            f"The {extreme} trial is also the recommended one: {number(answer.quality)} when hit exactly, "
             f"{number(answer.mean)} on average and {number(answer.worst)} at worst when {off}.",
             f"{_sentence(answer, 'The recommended point', name)} {why}",
             False,
         )
-    gap, error = _difference(highest, answer)
+    gap, error = _difference(report)
     text = (
-        f"{_sentence(highest, 'The highest point', name)} {_sentence(answer, 'The recommended point', name)} "
-        f"The means differ by {number(gap)} (standard error {number(error, 2)}, both points shaken alike)."
+        f"{_sentence(highest, f'The {extreme} point', name)} {_sentence(answer, 'The recommended point', name)} "
+        f"The means differ by {number(abs(gap))} (standard error {number(error, 2)}, both points shaken alike)."
     )
     lost, kept = halved(highest), halved(answer)
     if abs(gap) <= 2.0 * error and lost - kept > 2.0 * math.sqrt(lost + kept):
         headline = (
-            f"The highest peak ({number(highest.quality)}) was refused: when {off} it loses more than half in "
+            f"The {peak} ({number(highest.quality)}) was refused: when {off} it loses more than half in "
             f"{lost} of {highest.values.size} cases, the recommended point in {kept or 'none'}."
         )
         return Verdict(headline, text, True)
@@ -102,34 +104,35 @@ def verdict(report: RunReport) -> Verdict:
     means, worsts = (f"{number(highest.mean)} and {number(answer.mean)}", f"{number(highest.worst)} at worst")
     if abs(gap) <= 2.0 * error and tail > 0:
         headline = (
-            f"The highest peak ({number(highest.quality)}) was refused: when {off} it falls to {worsts}, the "
+            f"The {peak} ({number(highest.quality)}) was refused: when {off} it {falls} to {worsts}, the "
             f"recommended point to {number(answer.worst)}; on average they are worth about the same, {means}."
         )
         return Verdict(headline, text, True)
     if abs(gap) <= 2.0 * error and tail < 0:
         headline = (
-            f"When {off}, the highest trial and the recommended one are worth about the same on average ({means}), but "
-            f"the recommended one falls to {number(answer.worst)} at worst, the other to {number(highest.worst)}."
+            f"When {off}, the {extreme} trial and the recommended one are worth about the same on average ({means}), "
+            f"but the recommended one {falls} to {number(answer.worst)} at worst, the other to {number(highest.worst)}."
         )
         return Verdict(headline, text, False)
     if abs(gap) <= 2.0 * error:
         headline = (
-            f"When {off}, the highest trial and the recommended one are worth about the same: {means} on average, "
+            f"When {off}, the {extreme} trial and the recommended one are worth about the same: {means} on average, "
             f"{number(highest.worst)} and {number(answer.worst)} at worst."
         )
         return Verdict(headline, text, False)
     if gap > 0.0:
-        deeper = answer.worst < highest.worst - _notable(report)
-        yet = f", but falls to {number(answer.worst)} at worst (the peak to {number(highest.worst)})" * deeper
+        deeper = _better(report, highest.worst, answer.worst) > _notable(report)
+        yet = f", but {falls} to {number(answer.worst)} at worst (the other to {number(highest.worst)})" * deeper
+        worth = "as high as" if report.minimized else "worth only"
         headline = (
-            f"The highest peak ({number(highest.quality)}) was refused: when {off} it is worth only "
-            f"{number(highest.mean)}, the recommended point {number(answer.mean)}{yet}."
+            f"The {peak} ({number(highest.quality)}) was refused: when {off} it is {worth} {number(highest.mean)}, the "
+            f"recommended point {number(answer.mean)}{yet}."
         )
         return Verdict(headline, text, True)
-    holds = f", although it falls only to {number(answer.worst)} at worst (the peak to {number(highest.worst)})"
+    holds = f", although it {falls} only to {number(answer.worst)} at worst (the other to {number(highest.worst)})"
     headline = (
-        f"The model preferred a lower point, but the re-queries do not bear it out: when {off} it is worth "
-        f"{number(answer.mean)}, the highest peak {number(highest.mean)}{holds * (tail > 0)}."
+        f"The model preferred another point, but the re-queries do not bear it out: when {off} it is worth "
+        f"{number(answer.mean)}, the {peak} {number(highest.mean)}{holds * (tail > 0)}."
     )
     text += " More trials near both points would let the model see this."
     return Verdict(headline, text, False)
@@ -154,13 +157,16 @@ def _notable(report: RunReport) -> float:
 
 
 def _tail(report: RunReport) -> int:
-    """Return 1 where the recommended point's bad cases are better than the highest one's, -1 if worse, 0 if alike.
+    """Return 1 where the recommended point's bad cases are better than the best observed one's, -1 if worse, else 0.
 
-    Compared are the 5 % quantile and the worst of the re-queries; the first that differs by more than `_NOTABLE` of the
-    range of values that the run met decides.
+    Compared are what 95 % of the re-queries are better than, and the worst of them; the first that differs by more than
+    `_NOTABLE` of the range of values that the run met decides.
     """
-    highest, answer = report.highest, report.recommended
-    for difference in (answer.low - highest.low, answer.worst - highest.worst):
+    observed, answer = report.observed, report.recommended
+    for difference in (
+        _better(report, answer.bad, observed.bad),
+        _better(report, answer.worst, observed.worst),
+    ):
         if abs(difference) > _notable(report):
             return 1 if difference > 0.0 else -1
     return 0
@@ -168,17 +174,18 @@ def _tail(report: RunReport) -> int:
 
 def _of_the_model(report: RunReport) -> Verdict:
     """Return the verdict where nothing was queried again: what the model expects."""
-    highest, answer, off = report.highest, report.recommended, report.disturbance
+    highest, answer, off = report.observed, report.recommended, report.disturbance
+    peak = "lowest dip" if report.minimized else "highest peak"
     expected = number(answer.predicted_mean)
     text = f"No re-queries with perturbed inputs were made: what happens when {off} is what the model expects."
     if len(report.candidates) == 1:
         headline = (
-            f"The highest trial is also the recommended one: {number(answer.quality)} when hit exactly; when {off}, "
-            f"the model expects {expected}."
+            f"The {report.extreme} trial is also the recommended one: {number(answer.quality)} when hit exactly; when "
+            f"{off}, the model expects {expected}."
         )
         return Verdict(headline, text, False)
     headline = (
-        f"The highest peak ({number(highest.quality)}) is not recommended: when {off}, the model expects "
+        f"The {peak} ({number(highest.quality)}) is not recommended: when {off}, the model expects "
         f"{number(highest.predicted_mean)} of it, and {expected} of the recommended point."
     )
     where = f"Recommended is {coordinates(report, answer)} ({_trial(answer)} of {report.y.size}). {text}"
@@ -216,9 +223,15 @@ def _change(candidate: Candidate) -> str:
     return change(candidate) or f"{number(candidate.mean - candidate.quality)} from the exact value"
 
 
-def _difference(highest: Candidate, answer: Candidate) -> tuple[float, float]:
-    """Return the difference of the means and its standard error: paired where both were shaken alike."""
-    gap = answer.mean - highest.mean
+def _better(report: RunReport, one: float, other: float) -> float:
+    """Return by how much one value is better than another."""
+    return other - one if report.minimized else one - other
+
+
+def _difference(report: RunReport) -> tuple[float, float]:
+    """Return by how much the answer's mean is better, and the standard error: paired where both were shaken alike."""
+    highest, answer = report.observed, report.recommended
+    gap = _better(report, answer.mean, highest.mean)
     a, h = answer.values, highest.values
     if a.size == h.size and a.size > 1 and answer.n_failed == highest.n_failed == 0:
         return gap, float(np.std(a - h, ddof=1)) / math.sqrt(a.size)
@@ -226,4 +239,4 @@ def _difference(highest: Candidate, answer: Candidate) -> tuple[float, float]:
 
 
 def _trial(candidate: Candidate) -> str:
-    return "the model's choice" if candidate.trial is None else f"trial {candidate.trial + 1}"
+    return "the model's choice" if candidate.trial is None else f"trial {candidate.trial}"

@@ -31,7 +31,7 @@ class History(NamedTuple):
     X: NDArray[np.float64]
     """commanded inputs (t, d), in the units of the search space's box"""
     y: NDArray[np.float64]
-    """values (t,), larger is better; NaN for failed trials"""
+    """values (t,) as they were told; NaN for failed trials"""
     reached: NDArray[np.float64]
     """inputs truly reached (t, d), inside the box or not"""
     pending: NDArray[np.float64]
@@ -40,7 +40,7 @@ class History(NamedTuple):
     """numbers of the told trials (t,)"""
 
 
-def history_of(trials: Iterable[FrozenTrial], space: SearchSpace, maximize: bool, number: int | None = None) -> History:
+def history_of(trials: Iterable[FrozenTrial], space: SearchSpace, number: int | None = None) -> History:
     """Return what the trials say, the one with that number (the one being asked for) left out."""
     told: list[Mapping[str, Any]] = []
     reached: list[Mapping[str, Any]] = []
@@ -64,10 +64,9 @@ def history_of(trials: Iterable[FrozenTrial], space: SearchSpace, maximize: bool
         reached.append(actual if space.encodes(actual) else parameters)
         values.append(value if np.isfinite(value) else np.nan)
         numbers.append(trial.number)
-    y = np.array(values, dtype=np.float64)
     return History(
         space.encode_all(told),
-        y if maximize else -y,
+        np.array(values, dtype=np.float64),
         space.encode_all(reached, anywhere=True),
         space.encode_all(pending),
         np.array(numbers, dtype=np.intp),

@@ -11,9 +11,10 @@ import numpy as np
 from optuna.study import Study
 
 from surehold.errors import InputError
+from surehold.optimization.recommendation import outliers_in_words
 from surehold.studies.dashboard_note import read_note, write_note
 from surehold.studies.history import REACHED, history_of
-from surehold.studies.sampler import Sampler, maximizes
+from surehold.studies.sampler import Sampler, direction_of
 
 __all__ = ["RECOMMENDATION", "StudyRecommendation", "recommend"]
 
@@ -32,23 +33,25 @@ class StudyRecommendation:
     mean: float
     """expected outcome under the input noise"""
     std: float
-    """standard deviation of one outcome: input noise and what the model does not know together"""
+    """standard deviation of one execution: input noise, observation noise and what the model does not know"""
     quantile: float
-    """value that 95 % of outcomes are better than"""
+    """value that 95 % of executions are better than"""
     observed: float
     """value that was told for the trial"""
-    highest_trial: int
-    """number of the best observed trial, Optuna's best_trial"""
-    highest_value: float
+    best_trial: int
+    """number of the best observed trial, as in Optuna"""
+    best_value: float
     """its value"""
     n: int
     """trials with a value that the recommendation rests on"""
     refused: str
     """why the best observed trial is not recommended; empty where it is"""
+    outliers: tuple[int, ...] = ()
+    """numbers of the trials whose values are too far on the bad side of all others to be believed"""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
-        return asdict(self)
+        return asdict(self) | {"outliers": list(self.outliers)}
 
 
 def recommend(study: Study, sampler: Sampler | None = None) -> StudyRecommendation:
@@ -83,33 +86,31 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     sampler = sampler or study.sampler  # type: ignore[assignment]
     if not isinstance(sampler, Sampler):
         raise InputError(f"the study's sampler is {sampler}; load the study with a surehold.Sampler, or give one.")
-    maximize = maximizes(study)
-    sign = 1.0 if maximize else -1.0
+    direction = direction_of(study)
+    sign = 1.0 if direction == "maximize" else -1.0
     trials = study.get_trials(deepcopy=False)
     space = sampler.search_space(study)
-    history = history_of(trials, space, maximize)
-    with sampler.optimizing(space, history) as optimizer:
+    history = history_of(trials, space)
+    with sampler.optimizing(space, history, direction) as optimizer:
         best = optimizer.recommend()
         told = np.flatnonzero(np.isfinite(history.y))
         distance = np.abs(optimizer.box.to_unit(history.reached[told]) - optimizer.box.to_unit(best.x)).max(axis=1)
     same = told[distance <= distance.min() + 1e-9]
-    row = int(same[np.argmax(history.y[same])])
-    number, highest = int(history.numbers[row]), int(history.numbers[np.nanargmax(history.y)])
+    row, best_row = int(same[np.argmax(sign * history.y[same])]), int(np.nanargmax(sign * history.y))
+    number, best_number = int(history.numbers[row]), int(history.numbers[best_row])
     trial = next(t for t in trials if t.number == number)
-    text = best.refused
-    if text and not maximize:
-        text = f"With all signs changed, so that larger is better: {text}"
     return StudyRecommendation(
         trial.params | trial.user_attrs.get(REACHED, {}),
         number,
-        sign * best.mean,
+        best.mean,
         best.std,
-        sign * best.quantile,
-        sign * float(history.y[row]),
-        highest,
-        sign * float(np.nanmax(history.y)),
+        best.quantile,
+        float(history.y[row]),
+        best_number,
+        float(history.y[best_row]),
         best.n,
-        text if number != highest else "",
+        best.refused if number != best_number else "",
+        tuple(int(history.numbers[i]) for i in best.outliers),
     )
 
 
@@ -122,11 +123,14 @@ def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> 
         "| --- | --- |",
         *(f"| {key} | {_shown(value)} {units.get(key, '')} |" for key, value in found.parameters.items()),
         "",
-        f"Expect {found.mean:.4g} ± {found.std:.2g} when the input is off; 95 % of executions are better than "
-        f"{found.quantile:.4g}. It gave {found.observed:.4g} when it was tried. {found.n} trials with a value.",
+        f"Expect {found.mean:.4g} on average when the input is off, {found.mean:.4g} ± {found.std:.2g} of one "
+        f"execution; 95 % of executions are better than {found.quantile:.4g}. It gave {found.observed:.4g} when it was "
+        f"tried. {found.n} trials with a value.",
     ]
     if found.refused:
-        lines += ["", f"Not trial {found.highest_trial}, the best observed one. {found.refused}"]
+        lines += ["", f"Not trial {found.best_trial}, the best observed one. {found.refused}"]
+    if found.outliers:
+        lines += ["", outliers_in_words(found.outliers)]
     return "\n".join([*lines, "", _END])
 
 

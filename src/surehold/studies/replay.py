@@ -25,7 +25,7 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
         If no trial has given a value yet.
     """
     stored = {trial.number: trial for trial in study.trials()}
-    history = history_of(stored.values(), study.settings.space, True)
+    history = history_of(stored.values(), study.settings.space)
     n = len(history.y)
     if not np.isfinite(history.y).any():
         raise InputError(f"study '{study.name}' has no trial with a value yet; there is nothing to show.")
@@ -36,7 +36,8 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
     for count in sorted(replayed):
         optimizer.restore(history.X[:count], history.y[:count], reached=history.reached[:count])
         recommendations[count] = optimizer.recommend()
-    best = np.fmax.accumulate(history.y)
+    sign = 1.0 if study.settings.direction == "maximize" else -1.0
+    best = sign * np.fmax.accumulate(sign * history.y)
     trials = []
     for i in range(n):
         attributes = stored[int(history.numbers[i])].user_attrs

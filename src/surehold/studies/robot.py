@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 import optuna
-from optuna.study import Study
+from optuna.study import Study, StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError, SureholdError
@@ -94,7 +94,8 @@ class RobotStudy:
         opened = open_storage(storage, checked_name(name), create=True)
         with opened.closed_on_error(), opened.failures(), opened.handing_out(name):
             if name not in optuna.get_all_study_names(opened.backend):
-                study = optuna.create_study(storage=opened.backend, study_name=name, direction="maximize")
+                direction = StudyDirection[settings.direction.upper()]
+                study = optuna.create_study(storage=opened.backend, study_name=name, direction=direction)
                 study.set_user_attr(SETTINGS, settings.to_json())
             elif not resume:
                 raise InputError(f"study '{name}' exists in {opened.shown}; use it, or choose another name.")
@@ -174,7 +175,7 @@ class RobotStudy:
                 trial = self._ledger.trial(self.study.ask(self.settings.space.distributions).number)
                 self._ledger.hold(trial, holder)
             else:
-                parameters = self.sampler.suggest(trials, len(trials), True)
+                parameters = self.sampler.suggest(trials, len(trials), self.settings.direction)
                 marks = {HOLDER: holder} | ({} if promise is None else {PROMISE: promise})
                 trial = self._ledger.store(TrialState.RUNNING, parameters, marks)
             return self._asked(trial, False)
@@ -191,7 +192,7 @@ class RobotStudy:
             for trial in trials:
                 if trial.state == TrialState.WAITING and self.settings.space.contains(parameters_of(trial)):
                     return parameters_of(trial)
-            return self.sampler.suggest(trials, len(trials), True)
+            return self.sampler.suggest(trials, len(trials), self.settings.direction)
 
     def promise(self) -> float | None:
         """Return the improvement that a further trial is expected to bring; None during the initial design."""
@@ -322,10 +323,10 @@ class RobotStudy:
         return rule.reason(begun, now, [*promised, promise]), promise
 
     def _promise(self, trials: list[FrozenTrial]) -> float | None:
-        history = history_of(trials, self.settings.space, True)
+        history = history_of(trials, self.settings.space)
         if len(trials) < self.n_initial or not np.isfinite(history.y).any():
             return None
-        with self.sampler.optimizing(self.settings.space, history) as optimizer:
+        with self.sampler.optimizing(self.settings.space, history, self.settings.direction) as optimizer:
             return optimizer.promise()
 
     def _asked(self, trial: FrozenTrial, again: bool) -> Asked:

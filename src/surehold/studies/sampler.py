@@ -87,6 +87,8 @@ class Sampler(BaseSampler):
         warn_independent_sampling: bool = True,
         **settings: Any,
     ):
+        if "direction" in settings:
+            raise InputError("a sampler has no direction of its own; say optuna.create_study(direction=...).")
         if search_space is None or isinstance(search_space, SearchSpace):
             self._space = search_space
         else:
@@ -103,7 +105,7 @@ class Sampler(BaseSampler):
             anything = InputNoise.unit(0.1) if input_noise is not None else None
             Optimizer(Box.unit(1), input_noise=anything, surrogate=self._surrogate_for(0), **self._settings)
         elif self._space.box is not None:
-            self._new_optimizer(self._space, 0)
+            self._new_optimizer(self._space, 0, "maximize")
 
     # --- Optuna's interface -------------------------------------------------------------------------------------
 
@@ -123,7 +125,7 @@ class Sampler(BaseSampler):
         space = self._space
         if space is None or space.distributions != search_space:
             space = SearchSpace(search_space)
-        return self.suggest(study.get_trials(deepcopy=False), trial.number, maximizes(study), space)
+        return self.suggest(study.get_trials(deepcopy=False), trial.number, direction_of(study), space)
 
     def sample_independent(
         self, study: Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
@@ -145,17 +147,17 @@ class Sampler(BaseSampler):
     # --- ours ---------------------------------------------------------------------------------------------------
 
     def suggest(
-        self, trials: Sequence[FrozenTrial], number: int, maximize: bool, space: SearchSpace | None = None
+        self, trials: Sequence[FrozenTrial], number: int, direction: str, space: SearchSpace | None = None
     ) -> dict[str, Any]:
-        """Return the parameters of trial `number`, given all trials of the study."""
+        """Return the parameters of trial `number`, given all trials of the study and its direction."""
         space = space or self._known_space()
         if space.box is None:
             return space.decode(np.empty(0))
-        with self.optimizing(space, history_of(trials, space, maximize, number)) as optimizer:
+        with self.optimizing(space, history_of(trials, space, number), direction) as optimizer:
             return space.decode(optimizer.ask(number=number))
 
     def optimizer(self, study: Study) -> Optimizer:
-        """Return a new optimizer that has been told the study's trials; larger is better, whatever the direction.
+        """Return a new optimizer that has been told the study's trials.
 
         Raises
         ------
@@ -163,8 +165,8 @@ class Sampler(BaseSampler):
             If the study has several objectives, or no parameter can vary.
         """
         space = self.search_space(study)
-        history = history_of(study.get_trials(deepcopy=False), space, maximizes(study))
-        optimizer = self._new_optimizer(space, len(history.y))
+        history = history_of(study.get_trials(deepcopy=False), space)
+        optimizer = self._new_optimizer(space, len(history.y), direction_of(study))
         optimizer.restore(history.X, history.y, reached=history.reached, pending=history.pending)
         return optimizer
 
@@ -189,7 +191,7 @@ class Sampler(BaseSampler):
         return Optimizer.default_n_initial(space.box or Box.unit(1), space.variables) if given is None else given
 
     @contextmanager
-    def optimizing(self, space: SearchSpace, history: History) -> Iterator[Optimizer]:
+    def optimizing(self, space: SearchSpace, history: History, direction: str) -> Iterator[Optimizer]:
         """Lend an optimizer that has been told a history, to one thread at a time.
 
         Raises
@@ -198,9 +200,9 @@ class Sampler(BaseSampler):
             If every parameter can take one value only.
         """
         with self._lock:
-            key = (tuple(space.distributions.items()), self._surrogate_for(len(history.y)))
+            key = (tuple(space.distributions.items()), self._surrogate_for(len(history.y)), direction)
             if self._kept is None or self._kept[0] != key:
-                self._kept = (key, self._new_optimizer(space, len(history.y)))
+                self._kept = (key, self._new_optimizer(space, len(history.y), direction))
             optimizer = self._kept[1]
             optimizer.restore(history.X, history.y, reached=history.reached, pending=history.pending)
             yield optimizer
@@ -215,12 +217,12 @@ class Sampler(BaseSampler):
             return self._surrogate
         return "gp" if trials < _MANY else "tgp"
 
-    def _new_optimizer(self, space: SearchSpace, trials: int) -> Optimizer:
+    def _new_optimizer(self, space: SearchSpace, trials: int, direction: str) -> Optimizer:
         if space.box is None:
             raise InputError("every parameter can take one value only; there is nothing to optimize.")
         noise = space.input_noise(self._input_noise)
         surrogate = self._surrogate_for(trials)
-        settings: dict[str, Any] = {**self._settings, "n_initial": self.n_initial(space)}
+        settings: dict[str, Any] = {**self._settings, "n_initial": self.n_initial(space), "direction": direction}
         return Optimizer(space.box, input_noise=noise, surrogate=surrogate, lattice=space.lattice, **settings)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -230,8 +232,8 @@ class Sampler(BaseSampler):
         vars(self).update(state | {"_lock": threading.RLock()})
 
 
-def maximizes(study: Study) -> bool:
-    """Tell whether larger values are better; raises InputError for a study with several objectives."""
+def direction_of(study: Study) -> str:
+    """Return "maximize" or "minimize"; raises InputError for a study with several objectives."""
     if len(study.directions) != 1:
         raise InputError(f"study '{study.study_name}' has {len(study.directions)} objectives; surehold takes one.")
-    return study.direction == StudyDirection.MAXIMIZE
+    return "maximize" if study.direction == StudyDirection.MAXIMIZE else "minimize"

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from optuna.study import Study
 
-from surehold.errors import InputError
+from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.studies.sampler import Sampler
@@ -35,8 +35,12 @@ class StudySettings:
     """further settings of `Sampler`: seed, surrogate, criterion, n_initial, risk, ...; plain data, or a `Risk`"""
     problem: Mapping[str, Any] = field(default_factory=dict)
     """what a worker tries, as plain data; empty where a robot makes the trials"""
+    direction: str = "maximize"
+    """of the values: "maximize" or "minimize"."""
 
     def __post_init__(self) -> None:
+        if self.direction not in ("maximize", "minimize"):
+            raise unknown_name("direction", self.direction, ("maximize", "minimize"))
         _noise_to_json(self.input_noise, self.space)
         for name in self.units:
             if name not in self.space.distributions:
@@ -59,6 +63,7 @@ class StudySettings:
             "units": dict(self.units),
             "optimizer": {"seed": 0, **optimizer},
             "problem": dict(self.problem),
+            "direction": self.direction,
         }
 
     @classmethod
@@ -76,7 +81,8 @@ class StudySettings:
         space = SearchSpace.from_json(data["parameters"])
         optimizer = {k: Risk(**v) if k == "risk" and isinstance(v, dict) else v for k, v in data["optimizer"].items()}
         noise = _noise_from_json(data["input_noise"])
-        return cls(space, noise, data["units"], optimizer, data.get("problem", {}))
+        direction = data.get("direction", "maximize")  # studies before 0.2 say nothing, and maximize
+        return cls(space, noise, data["units"], optimizer, data.get("problem", {}), direction)
 
     @classmethod
     def of(cls, study: Study) -> "StudySettings":
@@ -101,6 +107,8 @@ class StudySettings:
                     ours, asked = ({k: side.get(k) for k in differing} for side in (ours, asked))
                 if ours != asked:
                     found.append(f"{name} {key}: {_short(ours)} in the study, {_short(asked)} now".strip())
+        if self.direction != other.direction:
+            found.append(f"direction: {self.direction} in the study, {other.direction} now")
         if mine["input_noise"] != theirs["input_noise"]:
             found.append(
                 f"input noise: {_short(mine['input_noise'])} in the study, {_short(theirs['input_noise'])} now"

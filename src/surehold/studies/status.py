@@ -30,7 +30,7 @@ def status(study: RobotStudy) -> dict[str, Any]:
     now = time.time()
     paused, stopped = study.paused, study.stopped()
     values = [t.values[0] for t in trials if t.state == TrialState.COMPLETE and t.values]
-    best = max(values, default=None)
+    best = (max if study.settings.direction == "maximize" else min)(values, default=None)
     return {
         "name": study.name,
         "storage": study.storage.shown,
@@ -38,8 +38,9 @@ def status(study: RobotStudy) -> dict[str, Any]:
         "reason": stopped if paused is None else paused,
         "trials": len(trials),
         **{name: sum(t.state == state for t in trials) for state, name in _STATES.items()},
-        "highest_value": best,
-        "highest_trial": next((t.number for t in trials if t.values and t.values[0] == best), None),
+        "direction": study.settings.direction,
+        "best_value": best,
+        "best_trial": next((t.number for t in trials if t.values and t.values[0] == best), None),
         "parameters": study.settings.to_json()["parameters"],
         "units": dict(study.settings.units),
         "input_noise": study.settings.to_json()["input_noise"],

@@ -80,14 +80,15 @@ def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> 
     return found
 
 
-def trials_of_study(study: Study, names: Mapping[str, str]) -> list[FormerTrial]:
+def trials_of_study(study: Study, names: Mapping[str, str], direction: str) -> list[FormerTrial]:
     """Return the finished trials of a study of Optuna; `names` are {parameter: its name there}.
 
-    Values of a study that minimizes change their sign. Trials that lack a parameter are refused by `import_trials`.
+    Values of a study of the other direction change their sign. Trials that lack a parameter are refused by
+    `import_trials`.
     """
     if len(study.directions) != 1:
         raise InputError(f"study '{study.study_name}' has {len(study.directions)} objectives; one is needed.")
-    sign = 1.0 if study.direction.name == "MAXIMIZE" else -1.0
+    sign = 1.0 if study.direction.name == direction.upper() else -1.0
     found = []
     for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.FAIL)):
         failed = trial.state == TrialState.FAIL

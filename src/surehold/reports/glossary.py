@@ -1,0 +1,74 @@
+"""The words that a report uses, explained to somebody who has read nothing else."""
+
+from typing import Final
+
+from surehold.reports.run_report import RunReport
+
+__all__ = ["glossary"]
+
+_QUALITIES: Final = {
+    "epsilon": (
+        "The weakest push or twist, over all directions, that the contacts can just resist while their normal forces "
+        "sum to 1; twists are divided by half the object's longest side. Higher is better; 0 means that some push is "
+        "not resisted at all. Grasps of the shipped objects reach about 0.2."
+    ),
+    "signed_epsilon": (
+        "Epsilon, the weakest push or twist that the contacts resist while their normal forces sum to 1, continued "
+        "below 0: the distance that is missing until every push is resisted."
+    ),
+    "volume": "Volume of the set of pushes and twists that the contacts can resist together. Higher is better.",
+    "simox": "Epsilon relative to that of forces everywhere on the object, as the simulator of the thesis has it.",
+    "task": "The largest share of the task's pushes, by default gravity from all sides, that the contacts resist.",
+    "closure": "1 where the contacts resist some force in every direction, else 0.",
+}
+
+
+def glossary(report: RunReport) -> list[tuple[str, str]]:
+    """Return the words of the page with their meaning, in the order in which they appear."""
+    better = "lower" if report.minimized else "higher"
+    words = [("trial", "One input that was tried. Trials are numbered from 0.")]
+    if report.n_initial:
+        words.append(("initial design", "Trials spread evenly over all inputs, before there is a model to choose by."))
+    words.append(("hit exactly", "The value of the trial itself, which reached its input."))
+    if report.noise is not None:
+        words += [
+            (
+                "input noise",
+                "How far an execution ends up from what is commanded: ± gives one standard deviation of each variable.",
+            ),
+            (
+                "re-queries",
+                "The point tried again, each time moved by the input noise. They only score the two points, are the "
+                "same moves for both, and are no part of the budget.",
+            ),
+            (
+                "95 % of them are better than",
+                f"{better.capitalize()} is better: one re-query in twenty is worse than this.",
+            ),
+            (
+                "mean under the noise",
+                "What many executions give on average. Its uncertainty is what the model does not know yet; it shrinks "
+                "with further trials.",
+            ),
+            (
+                "one execution",
+                "What the next execution gives. Its standard deviation holds the input noise, the noise of the "
+                "measurement and the model's uncertainty; trials do not make it vanish.",
+            ),
+            (
+                "unscented mean",
+                "The model averaged over a few points around an input that stand for the input noise: the map in which "
+                "a good place is one that holds.",
+            ),
+        ]
+    quality, contact = str(report.settings.get("quality", "")), report.settings.get("contact")
+    if quality in _QUALITIES:
+        words.append((f"quality ({quality})", _QUALITIES[quality]))
+        words.append(("below 0", "The open hand overlapped the object there, so it could not close: deeper is lower."))
+    if contact == "graded":
+        words.append(
+            ("graded contacts", "A soft touch: a point counts more the nearer it is to the skin, up to 3 mm away.")
+        )
+    if "s1" in [v.name for v in report.variables] or any("s1" in c.pose for c in report.candidates):
+        words.append(("s1", "Posture of the hand along its first synergy, in radians; here it turns the thumb."))
+    return words
