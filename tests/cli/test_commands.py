@@ -313,3 +313,29 @@ def test_output_in_ascii(here):
     text = done.stdout.decode("ascii")
     assert "+/-" in text
     assert (here / "plain" / "report.html").is_file()
+
+
+def test_minimize_answers_in_the_users_sign(here, capsys):
+    (here / "cost.py").write_text("def cost(x):\n    return float((x[0] - 0.3) ** 2) + 2.0\n")
+    assert surehold("minimize cost.py:cost --bounds x=0:1 --trials 12 --out down") == 0
+    printed = capsys.readouterr().out
+    assert "Minimize cost" in printed
+    assert "lowest" in printed
+    assert "highest" not in printed
+    data = json.loads((here / "down" / "result.json").read_text())
+    assert data["settings"]["direction"] == "minimize"
+    assert data["best"][-1] == min(data["trials"]["y"]) < 2.01
+    assert abs(data["candidates"][-1]["x"][0] - 0.3) < 0.1
+
+
+def test_a_study_minimizes(here, capsys):
+    assert surehold("study create down --parameters x=0:1 --initial 3 --direction minimize") == 0
+    for trial, value in enumerate((3.0, 1.0, 2.0)):
+        assert surehold("study ask down") == 0
+        assert surehold(f"study tell down {trial} {value}") == 0
+    capsys.readouterr()
+    assert surehold("study status down") == 0
+    assert "lowest value 1 (trial 1)" in capsys.readouterr().out
+    assert surehold("study recommend down") == 0
+    assert surehold("study create up --parameters x=0:1 --direction sideways") == 2
+    assert "maximize" in capsys.readouterr().err

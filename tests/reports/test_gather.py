@@ -94,3 +94,41 @@ def test_varying_noise_is_taken_at_the_point_shown():
     points = [place, *(place + s * np.sqrt(3.0) * d[k] * np.eye(2)[k] for k in (0, 1) for s in (-1, 1))]
     mean = mixture(result.optimizer.posterior.moments(box.to_unit(np.array(points))))[0]
     assert surface.robust_mean[i, j] == pytest.approx(mean @ [1 / 3, 1 / 6, 1 / 6, 1 / 6, 1 / 6], rel=1e-6)
+
+
+def test_a_minimizing_run_in_the_users_sign():
+    box = sh.Box({"x": (0.0, 1.0)})
+    noise = sh.InputNoise.unit(0.05)
+
+    def cost(x):
+        return float((x[0] - 0.3) ** 2 + 5.0)
+
+    result = sh.minimize(cost, box, 12, n_initial=6, seed=0, input_noise=noise)
+    labels = gather.answers(result)
+    report = gather.report_of(
+        result,
+        [gather.candidate(result, label, index, None) for label, index in labels.items()],
+        title="cost",
+        settings={},
+        noise=noise,
+    )
+    assert report.minimized
+    assert np.array_equal(report.best_trace, np.minimum.accumulate(result.y))
+    at = int(np.argmin(np.abs(report.surfaces[0].axes[0] - 0.5)))
+    assert report.surfaces[0].mean[at] == pytest.approx(cost(report.surfaces[0].axes[0][[at]]), abs=0.05)
+    assert report.robust_trace[-1] == result.recommendation.mean > 5.0
+
+
+def test_outliers_are_named_in_the_notes():
+    box = sh.Box({"x": (0.0, 1.0)})
+
+    def wild(x):
+        return -30.0 if 0.45 < x[0] < 0.55 else float(np.sin(3.0 * x[0]))
+
+    result = sh.maximize(wild, box, 12, n_initial=10, seed=0)
+    bad = np.flatnonzero(result.y == -30.0).tolist()
+    assert bad
+    candidates = [gather.candidate(result, label, i, None) for label, i in gather.answers(result).items()]
+    report = gather.report_of(result, candidates, title="wild", settings={}, noise=None)
+    assert len(report.notes) == 1
+    assert f" {', '.join(map(str, bad))} gave" in report.notes[0]

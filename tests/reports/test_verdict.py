@@ -167,3 +167,29 @@ def test_without_any_success_nobody_wins():
     assert told.text.startswith("How they ended: 3 × no contact; 1 × not closed.")
     assert told.text.endswith("Try another --facet.")
     assert not told.refused
+
+
+def mirrored(candidate):
+    other = replace(candidate, quality=-candidate.quality, values=-candidate.values, minimized=True)
+    return replace(other, label=candidate.label.replace("highest", "lowest"))
+
+
+@pytest.mark.parametrize(
+    ("observed", "answer"),
+    [
+        ((3.0, 1.0 + SPREAD), (2.0, 1.9 + 0.05 * SPREAD)),
+        ((3.0, 2.5 + 0.1 * SPREAD), (2.0, 1.9 + 0.1 * SPREAD)),
+        ((3.0, np.where(SPREAD > 0.9, -4.0, 2.0)), (2.0, np.where(SPREAD > 0.9, 1.0, 1.65))),
+    ],
+)
+def test_minimizing_is_maximizing_seen_in_a_mirror(observed, answer):
+    """The same verdict, in words of the other direction and in the user's own sign."""
+    pair = shaken("highest observed", *observed), shaken("recommended", *answer)
+    up = verdict(report(*pair))
+    y = np.array([-1.0, -2.0, -3.0, np.nan])
+    down = verdict(report(*map(mirrored, pair), y=y, best_trace=np.fmin.accumulate(y), minimized=True))
+    assert down.refused == up.refused
+    assert number(-pair[1].mean) in down.headline
+    assert "highest" not in down.headline + down.text
+    assert "falls" not in down.headline
+    assert ("lowest dip" in down.headline) == ("highest peak" in up.headline)

@@ -15,6 +15,7 @@ import surehold as sh
 from surehold.errors import InputError
 from surehold.studies.history import REACHED
 from surehold.studies.ledger import VETOED
+from surehold.studies.replay import result_of
 from surehold.studies.robot import NothingToAsk, RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
@@ -500,3 +501,37 @@ def test_what_cannot_have_been_reached_is_refused(reached, tmp_path):
     robot = RobotStudy.create("mug", StudySettings(SearchSpace({"dx": (-0.05, 0.05)})), str(tmp_path / "journal.log"))
     with pytest.raises(InputError, match=r"reached|dz"):
         robot.tell(robot.ask().id, 0.5, reached=reached)
+
+
+def test_a_study_that_minimizes_asks_what_its_mirror_image_asks(tmp_path):
+    """Values of the other sign, the same search; every answer in the user's own sign."""
+    noise = sh.InputNoise({"dx": 0.003, "dy": 0.003})
+    found = {}
+    for direction, sign in (("maximize", 1.0), ("minimize", -1.0)):
+        settings = StudySettings(SearchSpace(BOX), noise, {}, {"seed": 4, "n_initial": 6}, direction=direction)
+        study = RobotStudy.create("mug", settings, str(tmp_path / f"{direction}.log"))
+        asked = []
+        for _ in range(9):
+            trial = study.ask()
+            asked.append(trial.parameters)
+            study.tell(trial.id, sign * (3.0 + quality(trial.parameters)))
+        again = RobotStudy.open("mug", str(tmp_path / f"{direction}.log"))
+        assert again.settings.direction == direction
+        found[direction] = asked, again.recommend()
+        result = result_of(again)
+        assert result.y[result.best_index] == found[direction][1].best_value
+        assert result.trials[-1].best == found[direction][1].best_value
+    (up, best_up), (down, best_down) = found["maximize"], found["minimize"]
+    assert up == down
+    assert best_down.trial == best_up.trial
+    assert best_down.mean == pytest.approx(-best_up.mean, abs=1e-9)
+    assert best_down.quantile == pytest.approx(-best_up.quantile, abs=1e-9)
+
+
+def test_a_direction_that_does_not_exist_and_one_that_differs(tmp_path):
+    with pytest.raises(InputError, match="direction"):
+        StudySettings(SearchSpace(BOX), direction="down")
+    url = str(tmp_path / "journal.log")
+    RobotStudy.create("mug", StudySettings(SearchSpace(BOX)), url)
+    with pytest.raises(InputError, match="direction: maximize in the study, minimize now"):
+        RobotStudy.create("mug", StudySettings(SearchSpace(BOX), direction="minimize"), url, resume=True)
