@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
-from scipy.special import ndtri
+from scipy import special
 from scipy.stats import qmc
 
 import surehold as sh
@@ -59,7 +59,7 @@ def one(row: str, d: int, seed: int) -> tuple[float, float, float]:
         optimizer.tell(x, float(f(at[None])[0]) + deviation * rng.standard_normal())
     best = optimizer.recommend()
     spread = INPUT_NOISE if "input_noise" in settings else 0.0
-    normals = ndtri(qmc.Sobol(d + 1, seed=rng).random(4096))
+    normals = special.ndtri(qmc.Sobol(d + 1, seed=rng).random(4096))
     means = f(best.x + spread * normals[:, :d])
     executions = means + deviation * normals[:, d]
     low, high = best.expectation.quantile(0.025), best.expectation.quantile(0.975)
