@@ -13,6 +13,7 @@ from optuna.trial import TrialState
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.optimization.noise.input_noise import noise_of_coordinates
 from surehold.studies.history import REACHED
 from surehold.studies.ledger import VETOED
 from surehold.studies.replay import result_of
@@ -423,7 +424,7 @@ def test_a_bounded_noise_survives_the_storage_and_one_that_varies_is_refused(tmp
         asked = robot.ask()
         robot.tell(asked.id, quality(asked.parameters))
     mixed = SearchSpace({"dx": (-0.05, 0.05), "c": CategoricalDistribution("ab")})
-    spread = mixed.input_noise(sh.InputNoise.uniform({"dx": 0.003}))
+    spread = noise_of_coordinates(sh.InputNoise.uniform({"dx": 0.003}), mixed.box)
     assert spread.bounded
     assert np.diag(spread.unit_covariance(mixed.box)) == pytest.approx([0.0003, 0.0, 0.0])
     varying = sh.InputNoise.varying(lambda x: {"dx": 0.001, "dy": 0.001})

@@ -8,6 +8,7 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.optimization.noise.input_noise import noise_of_coordinates
 from surehold.studies.search_space import SearchSpace
 
 DISTRIBUTIONS = {
@@ -35,9 +36,9 @@ def test_every_point_of_the_box_is_a_trial_and_maps_back(seed):
         assert distribution._contains(distribution.to_internal_repr(parameters[name]))
     again = SPACE.decode(SPACE.encode(parameters))
     assert internal(again) == pytest.approx(internal(parameters), rel=1e-14)
-    snapped = SPACE.lattice.snap(u)
+    snapped = SPACE.box.snap(u)
     assert internal(SPACE.decode(SPACE.box.from_unit(snapped))) == pytest.approx(internal(parameters), rel=1e-9)
-    assert np.allclose(SPACE.lattice.snap(snapped), snapped, rtol=0, atol=1e-12)
+    assert np.allclose(SPACE.box.snap(snapped), snapped, rtol=0, atol=1e-12)
     assert np.allclose(SPACE.box.from_unit(snapped), SPACE.encode(parameters), rtol=0, atol=1e-9)
 
 
@@ -63,7 +64,7 @@ def test_the_types_are_plain():
 def test_all_of_a_box_of_numbers_can_be_tried():
     box = sh.Box({"a": (0.0, 2.0), "b": (-1.0, 1.0)})
     space = SearchSpace(box)
-    assert space.lattice is None
+    assert space.box.plain
     assert space.box == box
     assert SearchSpace({"a": (0.0, 2.0), "b": (-1.0, 1.0)}).box == box
 
@@ -74,12 +75,12 @@ def test_json_round_trip():
 
 def test_choices_carry_no_noise():
     noise = sh.InputNoise({"dx": 0.003, "force": 0.1, "turn": 0.0, "fingers": 0.2, "speed": 0.0})
-    found = SPACE.input_noise(noise).unit_covariance(SPACE.box)
+    found = noise_of_coordinates(noise, SPACE.box).unit_covariance(SPACE.box)
     deviations = dict(zip(SPACE.box.names, np.sqrt(np.diag(found)) * SPACE.box.widths, strict=True))
     assert deviations["dx"] == pytest.approx(0.003)
     assert deviations["force"] == pytest.approx(0.1)
     assert [v for name, v in deviations.items() if name.startswith("grip")] == [0.0] * 3
-    unit = SPACE.input_noise(sh.InputNoise.unit(0.1)).unit_covariance(SPACE.box)
+    unit = noise_of_coordinates(sh.InputNoise.unit(0.1), SPACE.box).unit_covariance(SPACE.box)
     assert np.count_nonzero(np.diag(unit)) == 5
 
 
@@ -93,9 +94,9 @@ def test_choices_carry_no_noise():
 )
 def test_noise_that_cannot_be_is_refused(noise, message):
     with pytest.raises(InputError, match=message):
-        SPACE.input_noise(noise)
-    with pytest.raises(InputError, match="all parameters are choices"):
-        SearchSpace({"c": CategoricalDistribution("ab")}).input_noise(sh.InputNoise.unit(0.1))
+        noise_of_coordinates(noise, SPACE.box)
+    with pytest.raises(InputError, match="all variables are choices"):
+        noise_of_coordinates(sh.InputNoise.unit(0.1), sh.Box({"c": ["a", "b"]}))
 
 
 GOOD = {"dx": 0.01, "force": 3, "turn": "0.5", "fingers": 3.0, "speed": "10", "grip": "None", "only": 7}

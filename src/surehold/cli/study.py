@@ -84,7 +84,7 @@ def create(
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
     optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
     input_noise = None if noise.strip().lower() == "none" else noise_of(noise, "bo")
-    if space.numbers is None:
+    if space.box is None or space.box.numbers is None:
         input_noise = None  # choices carry none
     settings = StudySettings(
         space, input_noise, parse_assignments(units, "--units") if units else {}, optimizer, described, direction

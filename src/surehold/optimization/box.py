@@ -1,29 +1,39 @@
-"""The search space: named bounds in the user's units, and the map to the unit cube in which the optimizer works."""
+"""The search space: named variables in the user's units, and the map to the unit cube in which the optimizer works."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
-from surehold.optimization.points import points_of
+from surehold.optimization.points import named_rows, points_of
+from surehold.optimization.variables import Choice, Number, Variable, variable_of
 
 __all__ = ["Box"]
 
 
 class Box:
-    """Named bounds; the order of the names is the order of the coordinates.
+    """Named variables; their order is the order of the coordinates.
 
     Parameters
     ----------
     bounds
-        `{name: (lower, upper)}` with finite `lower < upper`, in the user's units.
+        `{name: (lower, upper)}` with finite `lower < upper`, in the user's units. Behind the bounds may stand "log"
+        (the search is even in the logarithm), "int" (whole numbers) or "step=0.5" (levels from lower on). A list of
+        texts (or booleans) is a choice between them.
 
     Attributes
     ----------
-    names : tuple of str, length d
-    lower, upper : (d,) float64, read-only, the user's units
+    variables : what each variable is, see `optimization.variables`
+    plain : bool, whether every variable is a number of a linear scale that can take every value
+    names : tuple of str, names of the d coordinates: of the variables in a plain box, else see below
+    lower, upper : (d,) float64, read-only, of the coordinates
+
+    The coordinates of a box that is not plain are the logarithm of a logarithmic variable, and one of [0, 1] for each
+    text of a choice, 1 for the one that is taken. Whoever works with names (`encode`, `as_dict`, dictionaries told to
+    an optimizer, `AskedTrial.parameters`) does not meet them. Input noise is given for the numbers, in the units of the
+    coordinates: of a logarithmic one it is the standard deviation of the logarithm, a relative deviation.
 
     Raises
     ------
@@ -35,31 +45,29 @@ class Box:
     >>> box = Box({"dx": (-0.05, 0.05), "dy": (-0.03, 0.03)})
     >>> box.to_unit([0.0, 0.03])
     array([0.5, 1. ])
+    >>> mixed = Box({"force": (0.1, 10.0, "log"), "fingers": (2, 5, "int"), "grip": ["pinch", "power"]})
+    >>> mixed.as_dict(mixed.from_unit([0.5, 0.4, 0.1, 0.9]))
+    {'force': 1.0, 'fingers': 3, 'grip': 'power'}
     """
 
-    def __init__(self, bounds: Mapping[str, tuple[float, float]]):
+    def __init__(self, bounds: Mapping[str, Any]):
         if not isinstance(bounds, Mapping) or len(bounds) == 0:
             raise InputError(
                 f"bounds are {bounds!r}; give a mapping such as {{'dx': (-0.05, 0.05)}} of one or more names."
             )
-        pairs = []
-        for name, pair in bounds.items():
-            if not isinstance(name, str) or not name:
-                raise InputError(f"variable name {name!r} is not a non-empty string; name each variable, such as 'dx'.")
-            try:
-                lower, upper = (float(value) for value in pair)
-            except (TypeError, ValueError):
-                raise InputError(f"bounds of '{name}' are {pair!r}; give two numbers (lower, upper).") from None
-            if not (np.isfinite(lower) and np.isfinite(upper)):
-                raise InputError(f"bounds of '{name}' are ({lower}, {upper}); both must be finite numbers.")
-            if not lower < upper or not np.isfinite(upper - lower):
-                raise InputError(
-                    f"bounds of '{name}' are ({lower}, {upper}); lower must be smaller than upper: swap or widen them."
-                )
-            pairs.append((lower, upper))
-        self.names: Final[tuple[str, ...]] = tuple(bounds)
-        self.lower: Final[NDArray[np.float64]] = np.array([pair[0] for pair in pairs])
-        self.upper: Final[NDArray[np.float64]] = np.array([pair[1] for pair in pairs])
+        self.variables: Final[tuple[Variable, ...]] = tuple(variable_of(name, given) for name, given in bounds.items())
+        self.plain: Final = all(isinstance(v, Number) and not (v.step or v.log) for v in self.variables)
+        names: list[str] = []
+        limits: list[tuple[float, float]] = []
+        self._columns: Final[dict[str, slice]] = {}
+        for variable in self.variables:
+            own = [variable.name] if isinstance(variable, Number) else variable.coordinates
+            self._columns[variable.name] = slice(len(names), len(names) + len(own))
+            names += own
+            limits += [variable.bounds() if isinstance(variable, Number) else (0.0, 1.0)] * len(own)
+        self.names: Final[tuple[str, ...]] = tuple(names)
+        self.lower: Final[NDArray[np.float64]] = np.array([pair[0] for pair in limits])
+        self.upper: Final[NDArray[np.float64]] = np.array([pair[1] for pair in limits])
         self.lower.flags.writeable = False
         self.upper.flags.writeable = False
 
@@ -105,27 +113,94 @@ class Box:
         single = 2.0**-23 * np.maximum(np.abs(self.lower), np.abs(self.upper))
         return 1e-9 * self.widths + np.minimum(single, 1e-3 * self.widths)
 
-    def as_dict(self, x: Any) -> dict[str, float]:
-        """Return one point (d,) as `{name: value}`."""
-        return dict(zip(self.names, self.points(x).tolist(), strict=True))
+    # --- by name ------------------------------------------------------------------------------------------------
+
+    @property
+    def numbers(self) -> "Box | None":
+        """The box of the variables that are numbers: those that input noise is given for."""
+        found = {v.name: v for v in self.variables if isinstance(v, Number)}
+        return Box(found) if found else None
+
+    def columns(self, name: str) -> slice:
+        """Return where the coordinates of a variable are; raises KeyError for an unknown name."""
+        return self._columns[name]
+
+    def as_dict(self, x: Any) -> dict[str, Any]:
+        """Return one point (d,) as `{name: value}`: the nearest values that can be tried, as plain Python objects."""
+        x = self.points(x)
+        if self.plain:
+            return dict(zip(self.names, x.tolist(), strict=True))
+        found: dict[str, Any] = {}
+        for variable in self.variables:
+            own = x[self._columns[variable.name]]
+            found[variable.name] = (
+                variable.decoded(own[0]) if isinstance(variable, Number) else variable.choices[int(np.argmax(own))]
+            )
+        return found
+
+    def encode(self, rows: Sequence[Mapping[str, Any]]) -> NDArray[np.float64]:
+        """Return the points (n, d) for n dictionaries {name: value}; numbers may lie outside of their ranges.
+
+        Raises
+        ------
+        InputError
+            If a name is missing or unknown, a number has no coordinate, or a choice is none.
+        """
+        X = np.zeros((len(rows), self.dimension))
+        names = [variable.name for variable in self.variables]
+        for x, row in zip(X, rows, strict=True):
+            if len(row) != len(names) or any(name not in row for name in names):
+                raise InputError(f"point {dict(row)!r} does not fit; name exactly {', '.join(names)}.")
+            for variable in self.variables:
+                own, value = self._columns[variable.name], row[variable.name]
+                if isinstance(variable, Number):
+                    x[own] = variable.to_coordinate(np.array([variable.anywhere(value, "point")], dtype=np.float64))
+                else:
+                    x[own.start + variable.place(value)] = 1.0
+        return X
 
     def points(self, x: Any) -> NDArray[np.float64]:
-        """Return points (..., d) in the user's units, however they are handed over; see `points_of`."""
+        """Return points (..., d) of the box, however they are handed over; see `points_of`."""
+        if not self.plain and (rows := named_rows(x)) is not None:
+            X = self.encode(rows[0])
+            return X if rows[1] else X[0]
         return points_of(x, self.names)
 
+    # --- which points can be tried ------------------------------------------------------------------------------
+
+    @property
+    def smooth(self) -> NDArray[np.bool_]:
+        """Whether a coordinate can be tried everywhere, (d,)."""
+        smooth = np.zeros(self.dimension, dtype=bool)
+        for variable in self.variables:
+            smooth[self._columns[variable.name]] = isinstance(variable, Number) and not variable.step
+        return smooth
+
+    def snap(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the nearest points of the unit cube (..., d) that can be tried."""
+        snapped = np.array(U, dtype=np.float64)
+        for variable in self.variables:
+            own = self._columns[variable.name]
+            if isinstance(variable, Choice):
+                taken = np.argmax(U[..., own], axis=-1)
+                snapped[..., own] = np.arange(len(variable.choices)) == taken[..., None]
+            elif variable.step:
+                low, width = self.lower[own], self.widths[own]
+                value = variable.to_value(low + U[..., own] * width)
+                snapped[..., own] = (variable.to_coordinate(value) - low) / width
+        return snapped
+
     def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, Box)
-            and self.names == other.names
-            and np.array_equal(self.lower, other.lower)
-            and np.array_equal(self.upper, other.upper)
-        )
+        return isinstance(other, Box) and self.variables == other.variables
 
     def __hash__(self) -> int:
-        return hash((self.names, self.lower.tobytes(), self.upper.tobytes()))
+        return hash(self.variables)
 
     def __repr__(self) -> str:
-        inner = ", ".join(
-            f"{n!r}: ({lo:g}, {up:g})" for n, lo, up in zip(self.names, self.lower, self.upper, strict=True)
-        )
-        return f"Box({{{inner}}})"
+        def shown(variable: Variable) -> str:
+            if isinstance(variable, Choice):
+                return repr(list(variable.choices))
+            words = [repr(word) for word in variable.described[2:]]
+            return f"({', '.join([f'{variable.low:g}', f'{variable.high:g}', *words])})"
+
+        return f"Box({{{', '.join(f'{v.name!r}: {shown(v)}' for v in self.variables)}}})"

@@ -28,19 +28,20 @@ class Evaluation(NamedTuple):
     """time that asking took"""
 
 
-def evaluate(f: Callable[[NDArray[np.float64]], Any], x: NDArray[np.float64]) -> tuple[float, str]:
+def evaluate(f: Callable[[Any], Any], x: NDArray[np.float64] | dict[str, Any]) -> tuple[float, str]:
     """Return f(x) and an empty text, or NaN and why there is no finite number.
 
     Raises
     ------
     InputError
-        If f cannot be called with one array at all: no other x would be better.
+        If f cannot be called with one array, or one dictionary, at all: no other x would be better.
     """
     try:
         value = f(x.copy())
     except Exception as error:  # whatever a user's function raises is the trial's outcome, not the run's end
         if isinstance(error, TypeError) and _in_the_call(error.__traceback__):
-            raise InputError(f"the function cannot be called with one array x of shape {x.shape}: {error}.") from None
+            what = f"dictionary of {', '.join(x)}" if isinstance(x, dict) else f"array x of shape {x.shape}"
+            raise InputError(f"the function cannot be called with one {what}: {error}.") from None
         return np.nan, f"{type(error).__name__}: {error}"
     if value is None:
         return np.nan, "returned None instead of a number; does it lack a return"
@@ -53,6 +54,11 @@ def evaluate(f: Callable[[NDArray[np.float64]], Any], x: NDArray[np.float64]) ->
     if not np.isfinite(array).all():
         return np.nan, f"returned {float(array.reshape(()))}"
     return float(array.reshape(())), ""
+
+
+def argument(optimizer: Optimizer, asked: AskedTrial) -> NDArray[np.float64] | dict[str, Any]:
+    """Return what a function is called with: x (d,), or {name: value} where the box is not plain."""
+    return asked.x if optimizer.box.plain else asked.parameters
 
 
 def _in_the_call(traceback: TracebackType | None) -> bool:
@@ -69,7 +75,7 @@ def one_by_one(optimizer: Optimizer, f: Callable[..., Any], n_trials: int) -> It
         started = perf_counter()
         asked = optimizer.ask_trial()
         seconds = perf_counter() - started
-        yield Evaluation(asked, *evaluate(f, asked.x), seconds)
+        yield Evaluation(asked, *evaluate(f, argument(optimizer, asked)), seconds)
 
 
 def in_processes(optimizer: Optimizer, f: Callable[..., Any], n_trials: int, n_jobs: int) -> Iterator[Evaluation]:
@@ -97,7 +103,7 @@ def in_processes(optimizer: Optimizer, f: Callable[..., Any], n_trials: int, n_j
                 started = perf_counter()
                 asked = optimizer.ask_trial()
                 seconds = perf_counter() - started
-                running[pool.submit(evaluate, f, asked.x)] = (asked, seconds)
+                running[pool.submit(evaluate, f, argument(optimizer, asked))] = (asked, seconds)
                 begun += 1
             done = min(wait(running, return_when=FIRST_COMPLETED).done, key=lambda future: running[future][0].number)
             asked, seconds = running.pop(done)

@@ -7,7 +7,7 @@ have been perturbed.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
 
-__all__ = ["Lattice", "LatticePosterior", "with_fixed"]
+__all__ = ["Lattice", "LatticePosterior", "lattice_of"]
 
 
 @dataclass(frozen=True)
@@ -29,24 +29,29 @@ class Lattice:
     """whether a coordinate can be tried everywhere, (d,)"""
 
 
-def with_fixed(lattice: Lattice | None, box: Box, fixed: Mapping[str, float] | None) -> Lattice | None:
-    """Return the points of a lattice (None: all of the box) at which variables have fixed values {name: value}.
+def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | None:
+    """Return the points of a box that can be tried, those at which variables have fixed values {name: value}.
+
+    None: all of the box.
 
     Raises
     ------
     InputError
         If a name is unknown, a value is no number inside of the box, or no variable is left.
     """
+    lattice = None if box.smooth.all() else Lattice(box.snap, box.smooth)
     if not fixed:
         return lattice
-    x = box.from_unit(np.full(box.dimension, 0.5))
-    for name, value in fixed.items():
-        if name not in box.names:
-            raise unknown_name("fixed variable", name, box.names)
-        x[box.names.index(name)] = box.points({**box.as_dict(x), name: value})[box.names.index(name)]
+    names = [variable.name for variable in box.variables]
+    for name in fixed:
+        if name not in names:
+            raise unknown_name("fixed variable", name, names)
+    x = box.points({**box.as_dict(box.from_unit(np.full(box.dimension, 0.5))), **fixed})
     if not box.contains(x):
         raise InputError(f"fixed is {dict(fixed)!r}, which is not inside {box}.")
-    held = np.array([name in fixed for name in box.names])
+    held = np.zeros(box.dimension, dtype=bool)
+    for name in fixed:
+        held[box.columns(name)] = True
     if held.all():
         raise InputError("every variable is fixed; there is nothing to optimize.")
     values = np.clip(box.to_unit(x), 0.0, 1.0)

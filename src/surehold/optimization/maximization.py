@@ -106,10 +106,9 @@ class Result:
             import pandas
         except ImportError:
             raise SureholdError("to_dataframe needs pandas; install it: pip install pandas.") from None
-        table = pandas.DataFrame(
-            np.array([trial.x for trial in self.trials]).reshape(-1, self.optimizer.box.dimension),
-            columns=list(self.optimizer.box.names),
-        )
+        box = self.optimizer.box
+        columns = [variable.name for variable in box.variables]
+        table = pandas.DataFrame([box.as_dict(trial.x) for trial in self.trials], columns=columns)
         for name, column in (("value", "y"), ("failure", "failure"), ("best", "best"), ("seconds", "seconds")):
             values = [getattr(trial, column) for trial in self.trials]
             table[name if name not in table else f"trial {name}"] = values
@@ -138,7 +137,7 @@ class Result:
 
 
 def maximize(
-    f: Callable[[NDArray[np.float64]], float],
+    f: Callable[[Any], float],
     box: Box,
     n_trials: int = 100,
     *,
@@ -154,7 +153,8 @@ def maximize(
     Parameters
     ----------
     f
-        Takes x (d,) in the box's units, returns a number. A trial that raises, or gives anything but one finite
+        Takes x (d,) in the box's units, or a dictionary {name: value} where the box has logarithms, whole numbers or
+        choices; returns a number. A trial that raises, or gives anything but one finite
         number, is recorded as failed and the run goes on.
     n_trials
         Budget, initial design included.
@@ -229,7 +229,7 @@ def maximize(
     return Result(optimizer, tuple(trials), last or optimizer.recommend(), stopped == "Ctrl-C", stopped)
 
 
-def minimize(f: Callable[[NDArray[np.float64]], float], box: Box, n_trials: int = 100, **settings: Any) -> Result:
+def minimize(f: Callable[[Any], float], box: Box, n_trials: int = 100, **settings: Any) -> Result:
     """Minimize f over the box; arguments, result and errors as of `maximize`, all values in the sign of f.
 
     Examples

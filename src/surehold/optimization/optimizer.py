@@ -17,9 +17,9 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
-from surehold.optimization.lattice import Lattice, with_fixed
+from surehold.optimization.lattice import lattice_of
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
-from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
+from surehold.optimization.noise.input_noise import InputNoise, noise_of_coordinates
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.numerics.threads import single_threaded
@@ -47,7 +47,8 @@ class Optimizer:
     Parameters
     ----------
     box
-        The search space.
+        The search space. Where it is not plain (it has logarithms, whole numbers or choices), trials are handed out by
+        `ask_trial`, as dictionaries.
     direction
         "maximize" (default) or "minimize". Whatever is told and answered is in the user's own sign; the model, the
         criteria and `posterior` are of the negated values where the optimizer minimizes.
@@ -111,8 +112,6 @@ class Optimizer:
         "thesis", or "thesis-rkhs", "thesis-gf", "thesis-gm", "thesis-gm-printed", "thesis-gm-noise", "thesis-grasp":
         the settings of the thesis, with the constants that it chose by hand for that problem. It chooses trials in a
         way of its own, so that `risk`, `trust_region` and the Thompson criteria cannot be combined with it.
-    lattice
-        Which points can be tried, where not all of the box can; see `lattice.Lattice`.
 
     Raises
     ------
@@ -130,7 +129,7 @@ class Optimizer:
         criterion: str | None = None,
         n_initial: int | None = None,
         initial_points: Any = None,
-        fixed: Mapping[str, float] | None = None,
+        fixed: Mapping[str, Any] | None = None,
         design: str = "latin_hypercube",
         seed: int = 0,
         noise: float | NoiseName | None = None,
@@ -143,7 +142,6 @@ class Optimizer:
         noise_while_exploring: bool = False,
         trust_region: bool = False,
         preset: str | None = None,
-        lattice: Lattice | None = None,
     ):
         given = {name: value for name, value in locals().items() if name not in ("self", "box")}
         if not isinstance(box, Box):
@@ -153,9 +151,10 @@ class Optimizer:
         self.box: Final = box
         self.direction: Final = direction
         self._sign: Final = 1.0 if direction == "maximize" else -1.0
-        self.input_noise: Final = checked_input_noise(input_noise, box.names)
+        self.input_noise: Final = noise_of_coordinates(input_noise, box)
+        input_noise = self.input_noise
         self.seed: Final = _count("seed", seed, 0)
-        variables = box.dimension - len(fixed or ())
+        variables = len(box.variables) - len(fixed or ())
         first = initial_inputs(box, initial_points)
         self._settings = given | {"initial_points": None if initial_points is None else box.from_unit(first).tolist()}
         wanted = self.default_n_initial(box, variables) if n_initial is None else n_initial
@@ -194,7 +193,7 @@ class Optimizer:
                 "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials ('gp', "
                 "'tgp', or an object with known_noise), without a thesis preset."
             )
-        self._lattice = with_fixed(lattice, box, fixed)
+        self._lattice = lattice_of(box, fixed)
         self._model = ResponseModel(
             model,
             box,
@@ -212,9 +211,9 @@ class Optimizer:
     def default_n_initial(box: Box, variables: int | None = None) -> int:
         """Return the size of the initial design where none is given: 5 for each variable, at least 6.
 
-        `variables` are those that can vary, where the box has others, or several coordinates for one (a choice).
+        `variables` are those that can vary, where the box has others.
         """
-        return max(DESIGN_LEAST, DESIGN_PER_VARIABLE * (box.dimension if variables is None else variables))
+        return max(DESIGN_LEAST, DESIGN_PER_VARIABLE * (len(box.variables) if variables is None else variables))
 
     # --- trials -------------------------------------------------------------------------------------------------
 
@@ -326,7 +325,7 @@ class Optimizer:
         """Return the optimizer that `save` has written: it asks and recommends what that one would.
 
         Settings that are given replace stored ones; those that a file cannot hold must be: a surrogate that is an
-        object, a lattice, input noise that varies. (The chains of the thesis presets start anew.)
+        object, input noise that varies. (The chains of the thesis presets start anew.)
 
         Raises
         ------
@@ -359,18 +358,27 @@ class Optimizer:
 
         `number` is the number of the (first) trial asked for, 0 for the first of all: its place in the initial design
         and in the random sequence. By default the lowest that is free.
+
+        Raises
+        ------
+        InputError
+            If the box is not plain: `ask_trial` then names what to try.
         """
+        if not self.box.plain:
+            raise InputError(
+                "some variables are logarithmic, whole numbers or choices; ask_trial().parameters has them."
+            )
         if n is None:
             return self._ask_one(number).x
         return np.array([trial.x for trial in self._ask(n, number)])
 
     @overload
-    def ask_trial(self, n: None = None) -> AskedTrial: ...
+    def ask_trial(self, n: None = None, *, number: int | None = None) -> AskedTrial: ...
 
     @overload
-    def ask_trial(self, n: int) -> list[AskedTrial]: ...
+    def ask_trial(self, n: int, *, number: int | None = None) -> list[AskedTrial]: ...
 
-    def ask_trial(self, n: int | None = None) -> AskedTrial | list[AskedTrial]:
+    def ask_trial(self, n: int | None = None, *, number: int | None = None) -> AskedTrial | list[AskedTrial]:
         """Ask as `ask` does, for trials that know their numbers: `tell` takes one in place of x.
 
         However a rig rounds or names its inputs, the answer belongs to the trial that was asked for.
@@ -378,13 +386,17 @@ class Optimizer:
         Examples
         --------
         >>> from surehold import Box, Optimizer
+        >>> optimizer = Optimizer(Box({"force": (0.1, 10.0, "log"), "grip": ["pinch", "power"]}), seed=0)
+        >>> sorted(optimizer.ask_trial().parameters)
+        ['force', 'grip']
+        >>> from surehold import Box, Optimizer
         >>> optimizer = Optimizer(Box({"temperature": (20.0, 120.0)}), seed=0)
         >>> trial = optimizer.ask_trial()
         >>> optimizer.tell(trial, 0.7, reached=trial.x.round())
         >>> len(optimizer.pending)
         0
         """
-        return self._ask_one(None) if n is None else self._ask(n, None)
+        return self._ask_one(number) if n is None else self._ask(n, number)
 
     def _ask(self, n: int, number: int | None) -> list[AskedTrial]:
         return [self._ask_one(None if number is None else number + i) for i in range(_count("n", n, 1))]
@@ -399,7 +411,8 @@ class Optimizer:
             with single_threaded():
                 u = self._propose(self._rng(2, position))
         u = self._snapped(u)
-        return AskedTrial(self._trials.ask(position, u), self.box.from_unit(u))
+        x = self.box.from_unit(u)
+        return AskedTrial(self._trials.ask(position, u), x, self.box.as_dict(x))
 
     def _unused_place(self, position: int) -> int:
         """Return the place in the design to ask for next: the position, or the first unused one after a `forget`."""
@@ -456,7 +469,7 @@ class Optimizer:
                 reached,
                 ranking.coarse,
                 u,
-                self.box.from_unit(u),
+                self.box,
                 observed,
                 (history.tried[highest], float(history.observed[highest])),
                 int(self._trials.successful.sum()),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError
 
-__all__ = ["numbers_of", "points_of"]
+__all__ = ["named_rows", "numbers_of", "points_of"]
 
 _KINDS = {"M": "a date", "m": "a duration", "c": "complex"}
 
@@ -63,6 +63,19 @@ def numbers_of(value: Any) -> NDArray[np.float64]:
     for kind in sorted(kinds & set(_KINDS)):
         raise TypeError(f"holds {_KINDS[kind]}" if kind != "c" else "is complex")
     return array.astype(np.float64)
+
+
+def named_rows(x: Any) -> tuple[list[dict[Any, Any]], bool] | None:
+    """Return the dictionaries that x is made of, and whether it is a table of them; None of what carries no names."""
+    if isinstance(x, (list, tuple)) and x and all(isinstance(row, Mapping) for row in x):
+        return [dict(row) for row in x], True
+    named = _by_name(x)
+    if named is None:
+        return None
+    if hasattr(x, "columns") or (isinstance(x, np.ndarray) and x.ndim):
+        columns = {name: list(values) for name, values in named.items()}
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)], True
+    return [named], False
 
 
 def _by_name(x: Any) -> dict[Any, Any] | None:

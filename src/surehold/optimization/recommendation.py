@@ -9,11 +9,12 @@ Two distributions, both mixtures of normals:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.optimization.box import Box
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.surrogates.protocol import Posterior
 
@@ -91,6 +92,8 @@ class Recommendation:
         Distribution of the value of one execution.
     expectation : Outcome
         Distribution of the mean of many executions: what the model does not know of it.
+    parameters
+        x as {name: value}.
     """
 
     x: NDArray[np.float64]
@@ -104,6 +107,7 @@ class Recommendation:
     outliers: tuple[int, ...]
     execution: Outcome
     expectation: Outcome
+    parameters: dict[str, Any]
 
     def __repr__(self) -> str:
         x = np.array2string(self.x, precision=6, separator=", ")
@@ -150,7 +154,7 @@ def recommendation(
     reached: Perturbations,
     sigma_points: Perturbations,
     u: NDArray[np.float64],
-    x: NDArray[np.float64],
+    box: Box,
     observed: float,
     highest: tuple[NDArray[np.float64], float],
     n: int,
@@ -158,7 +162,7 @@ def recommendation(
     outliers: tuple[int, ...] = (),
     noise_variance: float | None = None,
 ) -> Recommendation:
-    """Describe u (d,) of the unit cube, x in the box's units; `highest` is the best observed trial and its value.
+    """Describe u (d,) of the unit cube; `highest` is the best observed trial and its value.
 
     `sign` is that of the values in which the answer is given: -1 where what was told has been turned over.
     """
@@ -179,6 +183,7 @@ def recommendation(
             f"recommended one {sign * outcome.mean:.4g} is expected, and {worse} than "
             f"{sign * outcome.quantile(_LEVEL):.4g} once in twenty."
         )
+    x = box.from_unit(u)
     return Recommendation(
         x,
         sign * outcome.mean,
@@ -191,4 +196,5 @@ def recommendation(
         outliers,
         Outcome(sign * outcome.means, outcome.stds),
         Outcome(sign * expectation.means, expectation.stds),
+        box.as_dict(x),
     )

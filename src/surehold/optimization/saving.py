@@ -31,7 +31,7 @@ def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], t
     data = {
         "format": _FORMAT,
         "version": _VERSION,
-        "box": {name: pair for name, *pair in zip(box.names, box.lower.tolist(), box.upper.tolist(), strict=True)},
+        "box": {variable.name: list(variable.described) for variable in box.variables},
         "settings": {name: _plain(value) for name, value in settings.items()},
         "trials": [
             {

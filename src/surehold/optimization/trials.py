@@ -6,7 +6,7 @@ A trial is known by its number, or by its place: what is told at x belongs to th
 `ROUNDED` box widths. Numbers count from 0; one that was forgotten is given out again before any new one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -34,6 +34,8 @@ class AskedTrial:
     """0 for the first of all"""
     x: NDArray[np.float64]
     """(d,), in the box's units"""
+    parameters: dict[str, Any] = field(default_factory=dict)
+    """the same by name"""
 
 
 #: Ranges of all other values by which an outlier lies below them.

@@ -152,9 +152,9 @@ class Sampler(BaseSampler):
         """Return the parameters of trial `number`, given all trials of the study and its direction."""
         space = space or self._known_space()
         if space.box is None:
-            return space.decode(np.empty(0))
+            return space.complete({})
         with self.optimizing(space, history_of(trials, space, number), direction) as optimizer:
-            return space.decode(optimizer.ask(number=number))
+            return space.complete(optimizer.ask_trial(number=number).parameters)
 
     def optimizer(self, study: Study) -> Optimizer:
         """Return a new optimizer that has been told the study's trials.
@@ -188,7 +188,7 @@ class Sampler(BaseSampler):
     def n_initial(self, space: SearchSpace) -> int:
         """Return the size of the initial design in a search space."""
         given = self._settings.get("n_initial")
-        return Optimizer.default_n_initial(space.box or Box.unit(1), space.variables) if given is None else given
+        return Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given
 
     @contextmanager
     def optimizing(self, space: SearchSpace, history: History, direction: str) -> Iterator[Optimizer]:
@@ -220,10 +220,9 @@ class Sampler(BaseSampler):
     def _new_optimizer(self, space: SearchSpace, trials: int, direction: str) -> Optimizer:
         if space.box is None:
             raise InputError("every parameter can take one value only; there is nothing to optimize.")
-        noise = space.input_noise(self._input_noise)
         surrogate = self._surrogate_for(trials)
         settings: dict[str, Any] = {**self._settings, "n_initial": self.n_initial(space), "direction": direction}
-        return Optimizer(space.box, input_noise=noise, surrogate=surrogate, lattice=space.lattice, **settings)
+        return Optimizer(space.box, input_noise=self._input_noise, surrogate=surrogate, **settings)
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_kept": None, "_lock": None}

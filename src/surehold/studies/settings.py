@@ -129,7 +129,7 @@ def _short(value: Any) -> str:
 
 def _noise_to_json(noise: InputNoise | None, space: SearchSpace) -> dict[str, Any] | None:
     """Return standard deviations or half-widths by name, or a covariance in the order of the numbers."""
-    numbers = space.numbers
+    numbers = None if space.box is None else space.box.numbers
     if noise is None or numbers is None:
         return None
     if noise.varies:

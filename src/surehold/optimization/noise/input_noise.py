@@ -21,7 +21,7 @@ from surehold.optimization.noise.kinds import Kind, root_of
 from surehold.optimization.noise.uniform import Uniform
 from surehold.optimization.noise.varying import Varying
 
-__all__ = ["InputNoise", "checked_input_noise"]
+__all__ = ["InputNoise", "checked_input_noise", "noise_of_coordinates"]
 
 _NO_NOISE: Final = "input noise of 0 in every variable is no noise; pass input_noise=None."
 
@@ -198,6 +198,33 @@ def checked_input_noise(value: Any, names: tuple[str, ...]) -> InputNoise | None
             f"variable's range, or sh.InputNoise({{{named}}}) for standard deviations in the variables' own units."
         )
     raise InputError(f"{shown}; give sh.InputNoise({{name: standard deviation}}) for {', '.join(names)}, or None.")
+
+
+def noise_of_coordinates(noise: InputNoise | None, box: Box) -> InputNoise | None:
+    """Return noise that was given for the numbers of a box as noise of its coordinates, none on choices.
+
+    Raises
+    ------
+    InputError
+        If it is no input noise, its names are not those of the numbers, or choices meet noise that is correlated or
+        varies.
+    """
+    numbers = box.numbers
+    noise = checked_input_noise(noise, () if numbers is None else numbers.names)
+    if noise is None or (numbers is not None and numbers.dimension == box.dimension):
+        return noise
+    if numbers is None:
+        raise InputError("input noise is given, but all variables are choices, which carry none; leave it out.")
+    if noise.varies:
+        raise InputError("input noise varies from place to place, and some variables are choices; give constants.")
+    covariance = noise.unit_covariance(numbers)
+    if np.any(covariance != np.diag(np.diag(covariance))):
+        raise InputError("input noise is correlated, and some variables are choices; give standard deviations.")
+    deviations = dict.fromkeys(box.names, 0.0)
+    deviations |= dict(zip(numbers.names, (np.sqrt(np.diag(covariance)) * numbers.widths).tolist(), strict=True))
+    if noise.bounded:
+        return InputNoise.uniform({name: 3.0**0.5 * deviation for name, deviation in deviations.items()})
+    return InputNoise(deviations)
 
 
 def _some(deviations: dict[str, float]) -> dict[str, float]:

@@ -1,0 +1,162 @@
+"""Boxes that hold more than numbers: logarithms, whole numbers, steps and choices."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+from surehold.optimization.maximization import maximize
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.optimizer import Optimizer
+
+BOX = Box(
+    {
+        "dx": (-0.05, 0.05),
+        "force": (0.1, 10.0, "log"),
+        "turn": (-1.0, 1.0, "step=0.25"),
+        "fingers": (2, 5, "int"),
+        "batch": (1, 1000, "int", "log"),
+        "grip": ["pinch", "power", "tripod"],
+        "wet": [True, False],
+    }
+)
+
+
+def worth(p):
+    """Best at force 2, 4 fingers, tripod, dry."""
+    loss = np.log(p["force"] / 2.0) ** 2 + 0.3 * (p["fingers"] - 4) ** 2 + 50.0 * p["dx"] ** 2
+    return float(-loss - (p["grip"] != "tripod") - 0.5 * p["wet"])
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_what_is_tried_is_in_its_range_and_maps_back(seed):
+    u = np.random.default_rng(seed).random(BOX.dimension)
+    p = BOX.as_dict(BOX.from_unit(u))
+    assert -0.05 <= p["dx"] <= 0.05
+    assert 0.1 <= p["force"] <= 10.0
+    assert p["turn"] in np.arange(-1.0, 1.1, 0.25)
+    assert type(p["fingers"]) is int
+    assert 2 <= p["fingers"] <= 5
+    assert type(p["batch"]) is int
+    assert 1 <= p["batch"] <= 1000
+    assert p["grip"] in ("pinch", "power", "tripod")
+    assert type(p["wet"]) is bool
+    x = BOX.points(p)
+    again = BOX.as_dict(x)
+    assert {name: again[name] for name in ("fingers", "batch", "grip", "wet", "turn", "dx")} == {
+        name: p[name] for name in ("fingers", "batch", "grip", "wet", "turn", "dx")
+    }
+    assert again["force"] == pytest.approx(p["force"], rel=1e-14)
+    np.testing.assert_allclose(BOX.from_unit(BOX.snap(u)), x, rtol=0, atol=1e-9)
+
+
+def test_a_logarithmic_variable_is_even_in_the_logarithm():
+    box = Box({"force": (0.1, 10.0, "log")})
+    assert box.as_dict(box.from_unit([0.5]))["force"] == pytest.approx(1.0)
+    assert box.as_dict(box.from_unit([0.75]))["force"] == pytest.approx(10.0**0.5)
+
+
+def test_only_what_can_be_tried_is_asked_and_the_best_of_it_is_found():
+    optimizer = Optimizer(BOX, seed=0, fixed={"turn": 0.5, "batch": 10})
+    for _ in range(45):
+        trial = optimizer.ask_trial()
+        assert trial.parameters["turn"] == 0.5
+        assert trial.parameters["batch"] == 10
+        optimizer.tell(trial, worth(trial.parameters))
+    best = optimizer.recommend().parameters
+    assert (best["grip"], best["wet"], best["fingers"]) == ("tripod", False, 4)
+    assert best["force"] == pytest.approx(2.0, rel=0.2)
+
+
+def test_functions_and_tables_see_the_names():
+    pytest.importorskip("pandas")
+    box = Box({"force": (0.1, 10.0, "log"), "grip": ["pinch", "power"]})
+    seen = []
+
+    def f(p):
+        seen.append(dict(p))
+        return -abs(np.log(p["force"])) - (p["grip"] == "pinch")
+
+    result = maximize(f, box, 14, seed=0)
+    table = result.to_dataframe()
+    assert list(table.columns[:2]) == ["force", "grip"]
+    assert table[["force", "grip"]].to_dict("records") == seen
+    assert result.recommendation.parameters["grip"] == "power"
+
+
+def test_dictionaries_and_tables_are_points():
+    pandas = pytest.importorskip("pandas")
+    box = Box({"force": (0.1, 10.0, "log"), "grip": ["pinch", "power"]})
+    rows = [{"grip": "power", "force": 1.0}, {"force": 0.1, "grip": "pinch"}]
+    expected = [[0.0, 0.0, 1.0], [np.log(0.1), 1.0, 0.0]]
+    np.testing.assert_allclose(box.points(rows), expected)
+    np.testing.assert_allclose(box.points(pandas.DataFrame(rows)), expected)
+    np.testing.assert_allclose(box.points(pandas.Series(rows[0])), expected[0])
+    optimizer = Optimizer(box, initial_points=rows, seed=0)
+    assert [trial.parameters for trial in optimizer.ask_trial(2)] == [
+        {"force": 1.0, "grip": "power"},
+        {"force": pytest.approx(0.1), "grip": "pinch"},
+    ]
+    optimizer.tell({"force": 1.0, "grip": "power"}, 0.3)
+    assert len(optimizer.pending) == 1
+
+
+def test_noise_is_of_the_numbers(tmp_path):
+    noise = InputNoise({"force": 0.1, "fingers": 0.0})
+    box = Box({"force": (0.1, 10.0, "log"), "fingers": (2, 5, "int"), "grip": ["pinch", "power"]})
+    optimizer = Optimizer(box, input_noise=noise, seed=1)
+    deviations = np.sqrt(np.diag(optimizer.input_noise.unit_covariance(box)))
+    np.testing.assert_allclose(deviations, [0.1 / np.log(100.0), 0.0, 0.0, 0.0], atol=1e-15)
+    optimizer.tell(optimizer.ask_trial(), 0.5)
+    optimizer.save(tmp_path / "run.json")
+    again = Optimizer.load(tmp_path / "run.json")
+    assert again.box == box
+    assert again.ask_trial().parameters == optimizer.ask_trial().parameters
+
+
+def test_such_a_box_hands_out_trials_by_name_only():
+    optimizer = Optimizer(BOX)
+    with pytest.raises(InputError, match="ask_trial"):
+        optimizer.ask()
+    assert repr(Box({"n": (2, 5, "int"), "grip": ["a", "b"]})) == "Box({'n': (2, 5, 'int'), 'grip': ['a', 'b']})"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ((0.0, 1.0, "log"), "logarithmic variable is positive"),
+        ((0.0, 1.5, "int"), "whole numbers"),
+        ((0.0, 1.0, "step=2"), "wider than its range"),
+        ((0.0, 1.0, "step=-1"), "step"),
+        ((0.1, 1.0, "log", "step=0.1"), "logarithmic and has steps"),
+        ((0.0, 1.0, "lin"), "'log', 'int'"),
+        ((0.0, 1.0, 2.0), "'log', 'int'"),
+        ((5, 2, "int"), "swap or widen"),
+        (["pinch"], "list of texts"),
+        (["pinch", "pinch"], "each can be there once"),
+        ("ab", "list of texts"),
+        (3, "list of texts"),
+    ],
+)
+def test_what_is_no_variable_is_said(given, words):
+    with pytest.raises(InputError, match=words):
+        Box({"v": given})
+
+
+@pytest.mark.parametrize(
+    ("point", "words"),
+    [
+        ({"force": 1.0}, "name exactly"),
+        ({"force": 1.0, "grip": "hook"}, "choice for 'grip'"),
+        ({"force": -1.0, "grip": "power"}, "can be reached"),
+        ({"force": "strong", "grip": "power"}, "finite number"),
+        ({"force": 1.0, "grip": "power", "x": 0.0}, "name exactly"),
+    ],
+)
+def test_points_that_do_not_fit_are_refused(point, words):
+    optimizer = Optimizer(Box({"force": (0.1, 10.0, "log"), "grip": ["pinch", "power"]}))
+    with pytest.raises(InputError, match=words):
+        optimizer.tell(point, 0.0)
+    assert len(optimizer.y) == 0
