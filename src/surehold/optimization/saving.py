@@ -86,14 +86,15 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
         box = Box(data["box"])
         settings = {name: _restored(name, value) for name, value in {**data["settings"], **given}.items()}
         told, pending = data["trials"], data["pending"]
-        trials = Trials(box, limits_of(settings.get("constraints")))
+        limits = limits_of(settings.get("constraints"))
+        trials = Trials(box, limits)
         trials.restore_cube(
             [trial["commanded"] for trial in told],
             [np.nan if trial["value"] is None else trial["value"] for trial in told],
             [trial["reached"] for trial in told],
             [trial["commanded"] for trial in pending],
             [trial["number"] for trial in [*told, *pending]],
-            np.array([trial.get("outputs", []) for trial in told], dtype=np.float64).reshape(len(told), -1),
+            np.array([trial.get("outputs", []) for trial in told], dtype=np.float64).reshape(len(told), len(limits)),
         )
         inputs = np.concatenate([trials.commanded, trials.pending])
         if not (np.isfinite(trials.reached).all() and np.all((inputs >= 0.0) & (inputs <= 1.0))):

@@ -15,7 +15,7 @@ the noise and the noise is Gaussian.
 """
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,12 +48,10 @@ class Within:
         q, d = U.shape
         moments = self._perturbations.outcome(self._posterior, U, gradient)
         mean, variance = moments.mean, np.maximum(moments.variance, 1e-290)
-        spread: Any
-        spread_slope: Any
         spread, spread_slope = self._spread(U, gradient)
         sigma = np.maximum(np.sqrt(variance), np.abs(mean) / _FARTHEST**1.5)
-        a = np.clip((self._limit.lower - mean + spread) / sigma, -np.inf, _FARTHEST)
-        b = np.clip((self._limit.upper - mean - spread) / sigma, -_FARTHEST, np.inf)
+        a = np.minimum((self._limit.lower - mean + spread) / sigma, _FARTHEST)
+        b = np.maximum((self._limit.upper - mean - spread) / sigma, -_FARTHEST)
         logs, by_a, by_b = log_interval(a, b)
         total = logsumexp(logs, axis=0) - np.log(len(logs))
         if not gradient:
@@ -69,10 +67,11 @@ class Within:
             slope += by_end[..., None] * ((sign * spread_slope - mean_slope) / sigma[..., None] - finite * half)
         return total, (share * slope).sum(axis=0)
 
-    def _spread(self, U: NDArray[np.float64], gradient: bool) -> tuple[Any, Any]:
-        """Return k s (m, q) and its gradients (m, q, d)."""
+    def _spread(self, U: NDArray[np.float64], gradient: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return k s (m, q) and its gradients (m, q, d), zeros (1, 1, 1) where not asked for."""
+        level = np.zeros((1, 1, 1))
         if self._spreads == 0.0:
-            return 0.0, 0.0
+            return level[0], level
         weights = self._perturbations.quadrature.weights
         moments, slopes = self._perturbations.spread(self._posterior, U, gradient)
         m, q, d = len(moments.mean), *U.shape
@@ -80,7 +79,7 @@ class Within:
         apart = mu - (mu @ weights)[..., None]
         s = np.sqrt(np.maximum(np.square(apart) @ weights, 1e-290))
         if not gradient or moments.mean_gradient is None:
-            return self._spreads * s, 0.0
+            return self._spreads * s, level
         slope = moments.mean_gradient.reshape(m, q, len(weights), d)
         if slopes is not None:
             slope = slope * slopes
