@@ -6,6 +6,7 @@ from .errors import InputError as InputError
 from .errors import SureholdError as SureholdError
 from .optimization.acquisition.risk_measures import Risk as Risk
 from .optimization.box import Box as Box
+from .optimization.constraints.linear import Linear as Linear
 from .optimization.maximization import Result as Result
 from .optimization.maximization import Trial as Trial
 from .optimization.maximization import maximize as maximize

@@ -118,6 +118,12 @@ ASCENT_SUFFICIENT: Final = 1e-4
 ASCENT_SHORTEN: Final = 0.25
 #: An ascent ends when a step is shorter, in box widths, or gains less than this share of 1 + |value|. Never measured.
 ASCENT_PRECISION: Final = 1e-8
+#: Where inputs are constrained, ascents stop at the border; the best one is followed by a random search: rounds, points
+#: in each, the first step in box widths, and the factor that shortens it after a round without success. Never measured.
+SETTLING_ROUNDS: Final = 14
+SETTLING_COPIES: Final = 24
+SETTLING_FIRST: Final = 0.03
+SETTLING_SHORTEN: Final = 0.4
 #: Step of central differences, in box widths: near the fourth root of the rounding error, for values that come from a
 #: factorization are good to about 1e-12. Never measured.
 DIFFERENCE_STEP: Final = 1e-4
@@ -210,3 +216,20 @@ THESIS_LOCAL_SCALE: Final = 0.05
 #: How often a trial may be repeated where observations are exact. The original repeats a point twenty times before it
 #: jumps to a random one, which cost it whole runs. Never measured against other numbers.
 THESIS_REPEATS: Final = 2
+
+# --- constraints ------------------------------------------------------------------------------------------------------
+
+#: Points of a Sobol sequence that are tested for the first allowed inputs: at most so many where all constraints are
+#: linear, and where a user's function has to be called for each; and allowed ones after which the search ends. A region
+#: of one part in 100,000 of the box, or in 16,000, is found by chance in two of three cases. Never measured.
+REGION_SEARCH: Final = 2**17
+REGION_SEARCH_CALLS: Final = 2**14
+REGION_KNOWN: Final = 256
+#: While nothing feasible is known, trials at once keep so many box widths apart: the standard deviation of the hole
+#: that a trial under way tears into the probability of being feasible. Never measured.
+APART: Final = 0.1
+#: Probability with which an answer has to keep the limits of further outputs, where `Optimizer(feasible=)` says
+#: nothing. Customary. Never measured.
+FEASIBLE: Final = 0.95
+#: Random allowed points among which an initial design replaces those of its points that are not. Never measured.
+REGION_POOL: Final = 256

@@ -12,18 +12,20 @@ from typing import Any, Final, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.defaults import DESIGN_LEAST, DESIGN_PER_VARIABLE, KAPPA, OUTCOME_EXPONENT
+from surehold.defaults import DESIGN_LEAST, DESIGN_PER_VARIABLE, FEASIBLE, KAPPA, OUTCOME_EXPONENT
 from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.lattice import lattice_of
+from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise, noise_of_coordinates
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.recommendation import Recommendation, recommendation
+from surehold.optimization.requirements import required
 from surehold.optimization.response_model import ResponseModel, chosen_surrogate
 from surehold.optimization.strategy.initial_design import design as initial_design
 from surehold.optimization.strategy.named import strategy_named
@@ -112,6 +114,20 @@ class Optimizer:
         "thesis", or "thesis-rkhs", "thesis-gf", "thesis-gm", "thesis-gm-printed", "thesis-gm-noise", "thesis-grasp":
         the settings of the thesis, with the constants that it chose by hand for that problem. It chooses trials in a
         way of its own, so that `risk`, `trust_region` and the Thompson criteria cannot be combined with it.
+    allowed
+        Which inputs may be commanded: a `Linear` constraint or its text ("a + 2*b <= 3"), a function of x (d,) in the
+        box's units that returns True or False, or a list of these. Kept by every trial that is asked for and by every
+        answer. Perturbed points are treated as at the border of the box, see `border`.
+    constraints
+        {name: (lower, upper)} of further outputs that each trial tells (`tell(x, y, constraints={name: value})`), in
+        their own units; None where there is no limit. With (None, None) an output is recorded and modelled only.
+    feasible
+        Probability with which the answer has to keep all limits of `constraints`: over the input noise (the share of
+        executions) and what the models do not know.
+    safety
+        Probability with which every trial after the `initial_points`, which must be given and are trusted, has to keep
+        all limits. By default None: trials may break them. What that guarantees, and what not, is said in
+        `requirements.Requirements.admission`.
 
     Raises
     ------
@@ -142,6 +158,10 @@ class Optimizer:
         noise_while_exploring: bool = False,
         trust_region: bool = False,
         preset: str | None = None,
+        allowed: Any = None,
+        constraints: Mapping[str, Any] | None = None,
+        feasible: float = FEASIBLE,
+        safety: float | None = None,
     ):
         given = {name: value for name, value in locals().items() if name not in ("self", "box")}
         if not isinstance(box, Box):
@@ -158,7 +178,7 @@ class Optimizer:
         first = initial_inputs(box, initial_points)
         self._settings = given | {"initial_points": None if initial_points is None else box.from_unit(first).tolist()}
         wanted = self.default_n_initial(box, variables) if n_initial is None else n_initial
-        self.n_initial: Final = max(_count("n_initial", wanted, 1), len(first))
+        self.n_initial: Final = len(first) if safety is not None else max(_count("n_initial", wanted, 1), len(first))
         if output_range is not None and direction == "minimize":
             output_range = (-output_range[1], -output_range[0])
         thesis = None if preset is None else thesis_preset(preset)
@@ -202,10 +222,26 @@ class Optimizer:
             continues_chains=self._strategy.continues_chains,
             seed=self.seed,
         )
+        limits = limits_of(constraints)
+        self._requirements = required(
+            box,
+            allowed,
+            limits,
+            level=feasible,
+            safety=safety,
+            ranking=self._strategy.ranking,
+            straying=input_noise if noise_while_exploring else None,
+            lattice=self._lattice,
+            seed=self.seed,
+            first=first,
+            preset=preset,
+        )
         rng = np.random.default_rng([self.seed, 0])
         rest = initial_design(design, max(self.n_initial - len(first), 1), box.dimension, rng)
+        if self._requirements is not None:
+            rest = self._requirements.initial(rest, first, rng)
         self._design = np.concatenate([first, rest])
-        self._trials = Trials(box)
+        self._trials = Trials(box, limits)
 
     @staticmethod
     def default_n_initial(box: Box, variables: int | None = None) -> int:
@@ -244,6 +280,7 @@ class Optimizer:
         *,
         failed: bool | Literal["rig"] = False,
         reached: Any = None,
+        constraints: Mapping[str, float | None] | None = None,
     ) -> None:
         """Record the outcome y of a trial at x, or that it gave nothing.
 
@@ -264,15 +301,18 @@ class Optimizer:
         reached
             Where the trial truly was, (d,), where that is known; inside of the box or not. The model learns from
             there; more than 1e6 box widths away counts as 1e6. `recommend` answers inputs inside the box only.
+        constraints
+            {name: value} of the further outputs: every one that has a limit, unless the trial failed; None for one that
+            could not be measured.
 
         Raises
         ------
         InputError
             If x or reached has the wrong shape, other names or is not finite, or x lies outside the box; if an
             `AskedTrial` has been told before; if y is missing, not finite or not a number; if a failed trial comes with
-            a value. Nothing told before is lost.
+            a value; if an output is missing, unknown or not finite. Nothing told before is lost.
         """
-        self._trials.tell(x, None if y is None else self._sign * number_of(y), failed, reached)
+        self._trials.tell(x, None if y is None else self._sign * number_of(y), failed, reached, constraints)
 
     def forget(self, x: Any) -> None:
         """Drop a pending trial, an `AskedTrial` or its x (d,), that will never be told; its number is asked for again.
@@ -289,11 +329,13 @@ class Optimizer:
         reached: ArrayLike | None = None,
         pending: ArrayLike | None = None,
         numbers: ArrayLike | None = None,
+        outputs: ArrayLike | None = None,
     ) -> None:
         """Replace all trials by stored ones: X (t, d) with values y (t,), NaN for failed ones, and pending (p, d).
 
         `reached` (t, d) are the inputs that were truly reached, X where None. `numbers` (t + p,) are those of the
-        trials, the pending ones last; 0, 1, 2, ... where None. What is asked next is what an optimizer asks that was
+        trials, the pending ones last; 0, 1, 2, ... where None. `outputs` (t, o) are the further outputs in the order of
+        `constraints`, NaN where not measured. What is asked next is what an optimizer asks that was
         told these trials in this order.
 
         Raises
@@ -301,16 +343,19 @@ class Optimizer:
         InputError
             If shapes do not fit, an input is not finite, X or pending lie outside the box, or a value is infinite.
         """
-        trials = Trials(self.box)
+        trials = Trials(self.box, self._trials.limits)
         trials.restore(
             X,
             self._sign * np.asarray(y, dtype=np.float64),
             X if reached is None else reached,
             () if pending is None else pending,
             numbers,
+            outputs,
         )
         if not trials.equal(self._trials):
             self._model.forget()
+            if self._requirements is not None:
+                self._requirements.forget()
         self._trials = trials
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -406,7 +451,7 @@ class Optimizer:
         if position < self.n_initial:
             u = self._design[self._unused_place(position) if number is None else position]
         elif not self._trials.successful.any():
-            u = self._rng(2, position).random(self.box.dimension)  # every trial failed or is pending: keep covering
+            u = self._anywhere(self._rng(2, position))  # every trial failed or is pending: keep covering
         else:
             with single_threaded():
                 u = self._propose(self._rng(2, position))
@@ -425,14 +470,32 @@ class Optimizer:
         return position if unused(position) else next(filter(unused, range(self.n_initial)), position)
 
     def _propose(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        candidates = self._snapped(self._strategy.candidates(self.posterior, self._history, rng))
-        if self._ranking.noisy:
+        history = self._history
+        if len(history.tried):
+            candidates = self._snapped(self._strategy.candidates(self.posterior, history, rng))
+        else:
+            candidates = self._snapped(self._nothing_feasible(rng))
+        if history.admission is not None:
+            candidates = candidates[history.admission.possible(candidates)]
+        if self._ranking.noisy and len(candidates):
             return candidates[0]
         tried = np.concatenate([self._trials.commanded, self._trials.pending])
         for candidate in candidates:
             if np.count_nonzero(same(candidate, tried)) <= self._strategy.repeats:
                 return candidate
-        return rng.random(self.box.dimension)  # every candidate has been tried already
+        return self._anywhere(rng)  # every candidate has been tried already
+
+    def _nothing_feasible(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        return (
+            np.empty((0, self.box.dimension))
+            if self._requirements is None
+            else (self._requirements.most_probable(self._trials, rng))
+        )
+
+    def _anywhere(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        if self._requirements is not None:
+            return self._requirements.otherwise(self._trials, rng)
+        return rng.random(self.box.dimension)
 
     # --- recommend ----------------------------------------------------------------------------------------------
 
@@ -454,17 +517,20 @@ class Optimizer:
         history, ranking = self._history, self._ranking
         with single_threaded():
             posterior = self.posterior
+            if not len(history.tried) and self._requirements is not None:
+                where, history = "observed", self._requirements.nearest(self._trials)
             if where == "observed":
                 index = int(ranking.order(posterior, history.tried, history.observed)[0])
                 u, observed = history.tried[index], float(history.observed[index])
             else:
                 rng = self._rng(3, len(self._trials))
-                u, observed = self._snapped(ranking.best(posterior, history.tried, rng)), np.nan
+                strict = None if self._requirements is None else self._requirements.strict(self._trials)
+                u, observed = self._snapped(ranking.best(posterior, history.tried, rng, strict)), np.nan
             reached = Perturbations.of(
                 self.input_noise, self.box, "quasi_monte_carlo", ranking.accurate.border, exponent=OUTCOME_EXPONENT
             )
             highest = int(np.argmax(history.observed))
-            return recommendation(
+            answer = recommendation(
                 posterior,
                 reached,
                 ranking.coarse,
@@ -477,6 +543,9 @@ class Optimizer:
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
                 self._model.execution_noise,
             )
+            if self._requirements is None:
+                return answer
+            return self._requirements.described(answer, self._trials, u, reached, self._sign)
 
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the model's mean and standard deviation (q,) at X (q, d) in the box's units.
@@ -536,8 +605,16 @@ class Optimizer:
     @property
     def _history(self) -> History:
         told = self._trials.eligible  # those that reached a place outside of the box are no answer, as failed ones
+        admission = None
+        if self._requirements is not None:
+            told = self._requirements.feasible(self._trials)
+            admission = self._requirements.admission(self._trials)
         return History(
-            self._trials.places[told], self._trials.modelled[told], self._trials.reached[~told], self._trials.pending
+            self._trials.places[told],
+            self._trials.modelled[told],
+            self._trials.reached[~told],
+            self._trials.pending,
+            admission,
         )
 
     def _snapped(self, U: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,8 +7,8 @@ Two distributions, both mixtures of normals:
                   noise; what is left of its spread is what the model does not know
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -94,6 +94,13 @@ class Recommendation:
         Distribution of the mean of many executions: what the model does not know of it.
     parameters
         x as {name: value}.
+    feasible
+        Probability that one execution keeps all limits of `constraints`, over the input noise and what the models do
+        not know; 1 where there are none.
+    infeasible
+        Why no feasible input is known and what came nearest; empty where one is. `x` is the nearest then.
+    outputs : dict
+        {name: Outcome} of the further outputs of one execution.
     """
 
     x: NDArray[np.float64]
@@ -108,6 +115,9 @@ class Recommendation:
     execution: Outcome
     expectation: Outcome
     parameters: dict[str, Any]
+    feasible: float = 1.0
+    infeasible: str = ""
+    outputs: Mapping[str, Outcome] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         x = np.array2string(self.x, precision=6, separator=", ")

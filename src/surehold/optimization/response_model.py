@@ -57,6 +57,8 @@ class ResponseModel:
         The input noise of the trials themselves; None if they reach what is commanded.
     continues_chains
         Whether a posterior goes on from the one before, so that it depends on all those before it.
+    screened
+        Whether failed trials and outliers count as the lowest other value; else all must have given a value.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class ResponseModel:
         lattice: Lattice | None,
         continues_chains: bool,
         seed: int,
+        screened: bool = True,
     ):
         self._surrogate: Final = surrogate
         self._box: Final = box
@@ -75,6 +78,7 @@ class ResponseModel:
         self._lattice: Final = lattice
         self._continues_chains: Final = continues_chains
         self._seed: Final = seed
+        self._screened: Final = screened
         self._cache: tuple[int, Posterior] | None = None
 
     def forget(self) -> None:
@@ -99,16 +103,15 @@ class ResponseModel:
         return posterior
 
     def _conditioned(self, trials: Trials) -> Posterior:
+        values = trials.modelled if self._screened else trials.values
         if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self._straying.unit_roots(self._box, trials.commanded).copy()
             roots[trials.reported] = 0.0
-            return condition_on_noisy_inputs(
-                self._surrogate, trials.reached, trials.modelled, roots, [self._seed, 1, 0]
-            )
+            return condition_on_noisy_inputs(self._surrogate, trials.reached, values, roots, [self._seed, 1, 0])
         # One random stream for all, so that what some trials taught stays as it was when others follow.
         previous = self._cache[1] if self._continues_chains and self._cache is not None else None
         rng = np.random.default_rng([self._seed, 1, len(trials) if self._continues_chains else 0])
-        return self._surrogate.condition(trials.reached, trials.modelled, rng, previous)
+        return self._surrogate.condition(trials.reached, values, rng, previous)
 
     @property
     def execution_noise(self) -> float | None:

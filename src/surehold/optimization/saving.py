@@ -12,6 +12,8 @@ import numpy as np
 from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
+from surehold.optimization.constraints.linear import Linear
+from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.trials import Trials
 
@@ -39,9 +41,10 @@ def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], t
                 "commanded": commanded.tolist(),
                 "reached": reached.tolist(),
                 "value": None if np.isnan(value) else float(value),
+                **({"outputs": [None if np.isnan(v) else v for v in outputs]} if outputs else {}),
             }
-            for number, commanded, reached, value in zip(
-                trials.numbers, trials.commanded, trials.reached, trials.values, strict=True
+            for number, commanded, reached, value, outputs in zip(
+                trials.numbers, trials.commanded, trials.reached, trials.values, trials.outputs.tolist(), strict=True
             )
         ],
         "pending": [
@@ -83,13 +86,15 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
         box = Box(data["box"])
         settings = {name: _restored(name, value) for name, value in {**data["settings"], **given}.items()}
         told, pending = data["trials"], data["pending"]
-        trials = Trials(box)
+        limits = limits_of(settings.get("constraints"))
+        trials = Trials(box, limits)
         trials.restore_cube(
             [trial["commanded"] for trial in told],
             [np.nan if trial["value"] is None else trial["value"] for trial in told],
             [trial["reached"] for trial in told],
             [trial["commanded"] for trial in pending],
             [trial["number"] for trial in [*told, *pending]],
+            np.array([trial.get("outputs", []) for trial in told], dtype=np.float64).reshape(len(told), len(limits)),
         )
         inputs = np.concatenate([trials.commanded, trials.pending])
         if not (np.isfinite(trials.reached).all() and np.all((inputs >= 0.0) & (inputs <= 1.0))):
@@ -106,6 +111,8 @@ def _plain(value: Any) -> Any:
         return {"input noise": value.to_json()}
     if isinstance(value, Risk):
         return {"risk": asdict(value)}
+    if isinstance(value, Linear):
+        return {"linear": asdict(value)}
     if isinstance(value, Mapping):
         return {name: _plain(entry) for name, entry in value.items()}
     if isinstance(value, (tuple, list)):
@@ -124,4 +131,8 @@ def _restored(name: str, value: Any) -> Any:
         return InputNoise.from_json(value["input noise"])
     if isinstance(value, dict) and "risk" in value:
         return Risk(**value["risk"])
+    if isinstance(value, dict) and "linear" in value:
+        return Linear(**value["linear"])
+    if name == "allowed" and isinstance(value, list):
+        return [_restored(name, entry) for entry in value]
     return value

@@ -6,6 +6,7 @@ A trial is known by its number, or by its place: what is told at x belongs to th
 `ROUNDED` box widths. Numbers count from 0; one that was forgotten is given out again before any new one.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
+from surehold.optimization.limits import Limit, checked_outputs
 from surehold.optimization.points import numbers_of
 
 __all__ = ["OUTLIER_DISTANCE", "ROUNDED", "AskedTrial", "Trials", "initial_inputs", "number_of", "same"]
@@ -48,10 +50,15 @@ def same(u: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool
 
 
 class Trials:
-    """All trials of one optimizer, in the order in which they were told."""
+    """All trials of one optimizer, in the order in which they were told.
 
-    def __init__(self, box: Box):
+    `limits` are those of further outputs that every trial tells, watched ones included.
+    """
+
+    def __init__(self, box: Box, limits: tuple[Limit, ...] = ()):
         self._box = box
+        self.limits: Final = limits
+        self._outputs: list[tuple[float, ...]] = []
         self._commanded: list[NDArray[np.float64]] = []
         self._reached: list[NDArray[np.float64]] = []
         self._values: list[float] = []
@@ -81,6 +88,11 @@ class Trials:
     def values(self) -> NDArray[np.float64]:
         """Values, (t,); NaN for failed trials."""
         return np.array(self._values, dtype=np.float64)
+
+    @property
+    def outputs(self) -> NDArray[np.float64]:
+        """Further outputs in the order of `limits`, (t, o); NaN where one was not measured."""
+        return np.array(self._outputs, dtype=np.float64).reshape(len(self), len(self.limits))
 
     @property
     def numbers(self) -> NDArray[np.intp]:
@@ -155,7 +167,14 @@ class Trials:
         self._pending[number] = u
         return number
 
-    def tell(self, x: Any, y: float | None, failed: bool | str, reached: Any) -> None:
+    def tell(
+        self,
+        x: Any,
+        y: float | None,
+        failed: bool | str,
+        reached: Any,
+        outputs: Mapping[str, float | None] | None = None,
+    ) -> None:
         """Record the outcome of a trial; see `Optimizer.tell`. Nothing is recorded where an argument is bad."""
         if failed not in (False, True, "rig"):
             raise unknown_name("kind of failure", failed, ("True", "rig"))
@@ -165,23 +184,37 @@ class Trials:
         if failed and y is not None:
             raise InputError(f"a failed trial has no value, but y is {y!r}; leave one of the two out.")
         value = np.nan if failed else number_of(y)
+        measured = checked_outputs(self.limits, outputs, bool(failed))
         if failed != "rig":
             self._commanded.append(commanded)
             self._reached.append(actual)
             self._values.append(value)
+            self._outputs.append(measured)
             self._numbers.append(self.next_number if number is None else number)
         if number is not None:
             del self._pending[number]
 
     def restore(
-        self, X: ArrayLike, y: ArrayLike, reached: ArrayLike, pending: ArrayLike, numbers: ArrayLike | None = None
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        reached: ArrayLike,
+        pending: ArrayLike,
+        numbers: ArrayLike | None = None,
+        outputs: ArrayLike | None = None,
     ) -> None:
         """Take over stored trials; see `Optimizer.restore`. Nothing is taken over where an argument is bad."""
         commanded, waiting = self._all("X", X, inside=True), self._all("pending", pending, inside=True)
-        self.restore_cube(commanded, y, self._all("reached", reached, inside=False), waiting, numbers)
+        self.restore_cube(commanded, y, self._all("reached", reached, inside=False), waiting, numbers, outputs)
 
     def restore_cube(
-        self, commanded: ArrayLike, y: ArrayLike, reached: ArrayLike, pending: ArrayLike, numbers: ArrayLike | None
+        self,
+        commanded: ArrayLike,
+        y: ArrayLike,
+        reached: ArrayLike,
+        pending: ArrayLike,
+        numbers: ArrayLike | None,
+        outputs: ArrayLike | None = None,
     ) -> None:
         """Take over trials whose inputs are points of the unit cube, as they are."""
         d = self._box.dimension
@@ -196,11 +229,18 @@ class Trials:
             )
         if np.isinf(values).any():
             raise InputError(f"y holds infinity at row {int(np.argmax(np.isinf(values)))}; give NaN for failed trials.")
+        measured = np.full((len(inputs), len(self.limits)), np.nan) if outputs is None else np.asarray(outputs, float)
+        if measured.shape != (len(inputs), len(self.limits)) or np.isinf(measured).any():
+            raise InputError(
+                f"outputs have shape {measured.shape}; give one finite number, or NaN, for each of {len(inputs)} "
+                f"trials and {len(self.limits)} constraints."
+            )
         total = len(inputs) + len(waiting)
         given = np.arange(total) if numbers is None or total == 0 else np.asarray(numbers)
         whole = given.shape == (total,) and given.dtype.kind in "iu" and np.all(given >= 0)
         if not whole or len(np.unique(given)) < total:
             raise InputError(f"numbers are {numbers!r}; give {total} different whole numbers, those pending last.")
+        self._outputs = [tuple(row) for row in measured.tolist()]
         self._commanded, self._reached = list(inputs), list(actual)
         self._values, self._numbers = values.tolist(), given[: len(values)].tolist()
         self._pending = dict(zip(given[len(values) :].tolist(), waiting, strict=True))
@@ -211,7 +251,22 @@ class Trials:
             np.array_equal(self.values, other.values, equal_nan=True)
             and np.array_equal(self.commanded, other.commanded)
             and np.array_equal(self.reached, other.reached)
+            and np.array_equal(self.outputs, other.outputs, equal_nan=True)
         )
+
+    def of_output(self, k: int) -> "Trials":
+        """Return the trials that measured output k, with that as their value."""
+        return self._with(self.outputs[:, k])
+
+    def without_failed(self) -> "Trials":
+        """Return the trials that gave a value."""
+        return self._with(self.values)
+
+    def _with(self, values: NDArray[np.float64]) -> "Trials":
+        some = np.isfinite(values)
+        found = Trials(self._box)
+        found.restore_cube(self.commanded[some], values[some], self.reached[some], (), self.numbers[some])
+        return found
 
     def forget(self, x: Any) -> None:
         """Drop the pending trial at x (d,), or an `AskedTrial`; raises InputError if there is none."""

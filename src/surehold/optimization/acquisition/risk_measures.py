@@ -138,6 +138,8 @@ class WorstCaseBound:
     where its lower bound is lowest.
     """
 
+    nature: Final = "bound"
+
     def __init__(self, posterior: Posterior, perturbations: Perturbations, kappa: float):
         self._posterior = posterior
         self._perturbations = perturbations

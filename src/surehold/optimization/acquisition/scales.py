@@ -98,6 +98,11 @@ class Acquisition:
         self._margin = margin
         self._kappa = kappa
 
+    @property
+    def nature(self) -> str:
+        """What the values are: the "logarithm" of an improvement, an "improvement" (0 for none), or a "bound"."""
+        return {"log_ei": "logarithm", "ucb": "bound"}.get(self._name.base, "improvement")
+
     def __call__(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values (q,) at points U (q, d) of the unit cube."""
         return self._evaluate(U, False)[0]

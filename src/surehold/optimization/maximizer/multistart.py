@@ -1,5 +1,7 @@
 """The highest point of an acquisition function over the unit cube, by gradient ascents from many candidates."""
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,10 @@ from surehold.defaults import (
     CANDIDATES_IN_REGIONS,
     COPIES,
     COPY_SCALES,
+    SETTLING_COPIES,
+    SETTLING_FIRST,
+    SETTLING_ROUNDS,
+    SETTLING_SHORTEN,
     START_DISTANCE,
     STARTS,
     STARTS_IN_REGIONS,
@@ -15,7 +21,19 @@ from surehold.defaults import (
 from surehold.optimization.maximizer.ascent import Objective, climb
 from surehold.optimization.surrogates.protocol import Regions
 
-__all__ = ["multistart", "promising"]
+__all__ = ["Admits", "multistart", "promising"]
+
+
+class Admits(Protocol):
+    """What decides which points are candidates at all; see `constraints.admission.Admission`."""
+
+    def weighed(self, objective: Objective) -> Objective:
+        """Return the objective, -inf where nothing can be tried."""
+        ...
+
+    def among(self, points: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return those of the points (c, d) that can be tried, or others that can; (0, d) if there are none."""
+        ...
 
 
 def multistart(
@@ -25,6 +43,7 @@ def multistart(
     anchors: NDArray[np.float64],
     rng: np.random.Generator,
     regions: Regions | None = None,
+    admission: Admits | None = None,
 ) -> NDArray[np.float64]:
     """Return points (c, d) worth trying, best first: gradient ascents from a Sobol sequence and perturbed anchors.
 
@@ -36,9 +55,16 @@ def multistart(
         Promising points, such as the best trials so far: a narrow peak is found from its flank, hardly by chance.
     regions
         Boxes, together a box, in each of which candidates are laid and which no ascent leaves; None: the whole cube.
+    admission
+        Which points can be tried; None: all. Only such are returned: none at all, (0, d), where none is found.
     """
     regions = regions or Regions.whole(dimension)
     points = promising(dimension, anchors, rng, regions)
+    if admission is not None:
+        objective, screen = admission.weighed(objective), admission.weighed(screen)
+        points = admission.among(np.concatenate([anchors, points]), rng)
+        if not len(points):
+            return points
     points = points[np.argsort(-screen(points), kind="stable")]
     home = _regions_of(points, regions)
     starts = _spread(points, STARTS)
@@ -46,7 +72,27 @@ def multistart(
         leaders = np.sort(np.unique(home, return_index=True)[1])[:STARTS_IN_REGIONS]
         starts = sorted({*leaders.tolist(), *starts})
     tops, values = climb(objective, points[starts], regions.lower[home[starts]], regions.upper[home[starts]])
-    return np.concatenate([tops[np.argsort(-values, kind="stable")], points])
+    order = np.argsort(-values, kind="stable")
+    if admission is not None:  # ascents stop at a border which is no box's; the best one goes along it
+        tops = np.concatenate([_settled(objective, tops[order[0]], float(values[order[0]]), rng)[None, :], tops[order]])
+        return np.concatenate([tops, points])
+    return np.concatenate([tops[order], points])
+
+
+def _settled(
+    objective: Objective, top: NDArray[np.float64], value: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Return the best point (d,) found from a top by a random search whose steps shrink after each failure."""
+    scale = SETTLING_FIRST
+    for _ in range(SETTLING_ROUNDS):
+        copies = np.clip(top + scale * rng.standard_normal((SETTLING_COPIES, len(top))), 0.0, 1.0)
+        values = objective(copies)
+        best = int(np.argmax(values))
+        if values[best] > value:
+            top, value = copies[best], float(values[best])
+        else:
+            scale *= SETTLING_SHORTEN
+    return top
 
 
 def promising(

@@ -39,7 +39,8 @@ class Covering:
     def candidates(self, posterior: Posterior, history: History, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return points of the cube (c, d) for the next trial, best first."""
         if self._stalled(posterior, history):
-            return largest_holes(np.concatenate([history.tried, history.failed, history.pending]), rng)
+            points = np.concatenate([history.tried, history.failed, history.pending])
+            return largest_holes(points, rng, history.admission)
         return self.strategy.candidates(posterior, history, rng)
 
     def _stalled(self, posterior: Posterior, history: History) -> bool:

@@ -63,7 +63,10 @@ class ExpectedImprovement:
             anchors,
             rng,
             regions,
+            history.admission,
         )
+        if not len(found):
+            return found
         if scale == "robust":
             found = np.concatenate([where_to_look(posterior, found[0], accurate, coarse), found])
         return found

@@ -29,5 +29,9 @@ def promise(ranking: Ranking, posterior: Posterior, history: History, rng: np.ra
     else:
         best, anchors = ranking.incumbent(posterior, history, scale)
         objective = screen = RiskImprovement(posterior, ranking.accurate, ranking.risk, float(best), rng)
-    found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions)
+    found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, history.admission)
+    if history.admission is not None:
+        if not len(found):
+            return 0.0
+        objective = history.admission.weighed(objective)
     return max(float(objective(found[:1])[0]), 0.0)

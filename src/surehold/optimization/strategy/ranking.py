@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from surehold.defaults import ANCHORS, SCREENING_DIVISOR, SHORTLIST
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
 from surehold.optimization.acquisition.scales import Acquisition, CriterionName, Scale
+from surehold.optimization.constraints.admission import Admission
 from surehold.optimization.maximizer.multistart import multistart
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
@@ -35,6 +36,8 @@ class History(NamedTuple):
     """inputs that gave no value, (f, d)"""
     pending: NDArray[np.float64]
     """inputs of trials under way, (p, d)"""
+    admission: Admission | None = None
+    """what a trial must satisfy besides; those tried that do not count as failed"""
 
     @property
     def told(self) -> int:
@@ -81,7 +84,13 @@ class Ranking:
         order[:SHORTLIST] = top[np.argsort(-values, kind="stable")]
         return order
 
-    def best(self, posterior: Posterior, tried: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    def best(
+        self,
+        posterior: Posterior,
+        tried: NDArray[np.float64],
+        rng: np.random.Generator,
+        admission: Admission | None = None,
+    ) -> NDArray[np.float64]:
         """Return the point of the cube (d,) with the best modelled outcome; `tried` (n, d) guide the search."""
         anchors = tried[self.order(posterior, tried)[:ANCHORS]]
         if self.risk.name == "mean":
@@ -92,7 +101,7 @@ class Ranking:
             )
         else:
             objective = screen = self._measured(posterior)
-        found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions)
+        found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, admission)
         candidates = np.concatenate([anchors[:1], found[:ANCHORS]])
         return candidates[self.order(posterior, candidates)[0]]
 

@@ -41,8 +41,12 @@ class RiskAverse:
         d = anchors.shape[1]
         if risk.name == "worst":
             bound = WorstCaseBound(posterior, accurate, self.kappa)
-            found = multistart(bound, bound, d, anchors, rng, regions)
+            found = multistart(bound, bound, d, anchors, rng, regions, history.admission)
+            if not len(found):
+                return found
             return np.concatenate([bound.weakest(found[0]), found])
         improvement = RiskImprovement(posterior, accurate, risk, best, rng)
-        found = multistart(improvement, improvement, d, anchors, rng, regions)
+        found = multistart(improvement, improvement, d, anchors, rng, regions, history.admission)
+        if not len(found):
+            return found
         return np.concatenate([where_to_look(posterior, found[0], accurate, self.ranking.coarse), found])

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from surehold.defaults import JOINT_POINTS, PLAUSIBLE
 from surehold.optimization.acquisition.scales import Acquisition, CriterionName
+from surehold.optimization.constraints.admission import Admission
 from surehold.optimization.maximizer.multistart import promising
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
@@ -39,9 +40,20 @@ class Thompson:
         one = posterior.thinned(1, int(rng.integers(2**31)))
         perturbations = Perturbations(exact(d)) if self.exactly else self.ranking.coarse
         points = promising(d, anchors, rng, posterior.regions)
+        if history.admission is not None:
+            points = self._admitted(history.admission, np.concatenate([anchors, points]), rng)
+            if not len(points):
+                return points
         upper = Acquisition(one, CriterionName("ucb", "robust"), perturbations, 0.0, kappa=PLAUSIBLE)(points)
         weights = perturbations.quadrature.weights
         points = points[np.argsort(-upper, kind="stable")[: JOINT_POINTS // len(weights)]]
         around = perturbations.around(points).reshape(1, -1, d)
         draw = one.sample(around, rng.standard_normal((1, around.shape[1])))[0, 0, 0]
         return points[np.argsort(-(draw.reshape(len(points), -1) @ weights), kind="stable")]
+
+    @staticmethod
+    def _admitted(admission: Admission, points: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return the points that can be tried and at which what is required holds in a draw of its own."""
+        points = admission.among(points, rng)
+        probability = np.exp(admission.log_probability(points)[0])
+        return points[probability >= min(rng.random(), probability.max(initial=0.0))]

@@ -1,0 +1,108 @@
+"""Limits of further outputs of a trial: given at construction, held against what is told."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError, unknown_name
+
+__all__ = ["Limit", "checked_outputs", "limits_of"]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Between what an output must stay."""
+
+    name: str
+    lower: float
+    """-inf for none"""
+    upper: float
+    """inf for none"""
+
+    @property
+    def watched(self) -> bool:
+        """Whether the output has no limit and is recorded only."""
+        return self.lower == -np.inf and self.upper == np.inf
+
+    def missed_by(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return by how much values are beyond the nearer limit: negative inside, NaN of NaN."""
+        return np.maximum(self.lower - values, values - self.upper)
+
+
+def limits_of(constraints: Mapping[str, Sequence[float | None]] | None) -> tuple[Limit, ...]:
+    """Return the limits of `Optimizer(constraints={name: (lower, upper)})`; None is no limit.
+
+    Raises InputError for limits that are no numbers, contradict each other or are equal.
+    """
+    if constraints is None:
+        return ()
+    if not isinstance(constraints, Mapping):
+        raise InputError(
+            f"constraints are {constraints!r}; give {{name: (lower, upper)}}, None where there is no limit."
+        )
+    found = []
+    for name, pair in constraints.items():
+        if not isinstance(name, str) or not name:
+            raise InputError(f"the name of a constraint is {name!r}; name each output, such as 'torque'.")
+        try:
+            lower, upper = pair
+            low = -np.inf if lower is None else _number(lower)
+            high = np.inf if upper is None else _number(upper)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"limits of '{name}' are {pair!r}; give (lower, upper), None where there is none."
+            ) from None
+        if np.isnan(low) or np.isnan(high) or low == np.inf or high == -np.inf or not low < high:
+            raise InputError(
+                f"limits of '{name}' are {pair!r}; the lower one must be smaller than the upper one. (Both None: the "
+                "output is recorded only.)"
+            )
+        found.append(Limit(name, low, high))
+    return tuple(found)
+
+
+def checked_outputs(
+    limits: tuple[Limit, ...], told: Mapping[str, float | None] | None, failed: bool
+) -> tuple[float, ...]:
+    """Return the outputs of one trial in the order of the limits, NaN where one was not measured (None).
+
+    A trial that failed, and an output that is only watched, need none. Raises InputError for an unknown name, a value
+    that is no finite number, and one that is missing.
+    """
+    if told is not None and not isinstance(told, Mapping):
+        raise InputError(f"constraints are {told!r}; give {{name: value}}.")
+    names = [limit.name for limit in limits]
+    given = dict(told or {})
+    for name in given:
+        if not names:
+            raise InputError(
+                f"output {name!r} was told, but this optimizer has no constraints; say "
+                f"Optimizer(constraints={{{name!r}: (None, 3.0)}}), or (None, None) to record it only."
+            )
+        if name not in names:
+            raise unknown_name("constraint", name, names)
+    found = []
+    for limit in limits:
+        if limit.name not in given and not failed and not limit.watched:
+            raise InputError(
+                f"the trial says nothing about '{limit.name}'; tell constraints={{{limit.name!r}: value}}, or None "
+                "where it could not be measured."
+            )
+        value = given.get(limit.name)
+        try:
+            number = np.nan if value is None else _number(value)
+        except (TypeError, ValueError):
+            raise InputError(f"constraint '{limit.name}' is {value!r}; give one finite number, or None.") from None
+        if value is not None and not np.isfinite(number):
+            raise InputError(f"constraint '{limit.name}' is {value!r}; give one finite number, or None.")
+        found.append(number)
+    return tuple(found)
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool):
+        raise TypeError("a truth value is no limit")
+    return float(value)

@@ -1,0 +1,341 @@
+"""What an optimizer requires of its trials and of its answer, besides a good value: the models of all of that.
+
+    may be commanded   `allowed`, see `constraints.input`
+    within limits      further outputs, see `constraints.outcome`; each has a Gaussian process of its own
+    safe               in safe mode, see `Requirements.admission`
+
+A trial is feasible, and may become the answer, where an execution there keeps all outputs within their limits with the
+probability `level`: over the input noise and what the models do not know. Without either, what was told decides.
+"""
+
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from surehold.defaults import ANCHORS, APART
+from surehold.errors import InputError, SureholdError
+from surehold.optimization.box import Box
+from surehold.optimization.constraints.admission import Admission, Likelihood
+from surehold.optimization.constraints.input import Region, checked_rules
+from surehold.optimization.constraints.outcome import Within, execution_probability
+from surehold.optimization.lattice import Lattice
+from surehold.optimization.limits import Limit
+from surehold.optimization.maximizer.multistart import multistart
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.noise.quadratures import exact
+from surehold.optimization.recommendation import Recommendation, execution_at
+from surehold.optimization.response_model import ResponseModel
+from surehold.optimization.strategy.ranking import History, Ranking
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, NoiseName
+from surehold.optimization.surrogates.protocol import Posterior
+from surehold.optimization.trials import Trials, same
+
+__all__ = ["Requirements", "required"]
+
+
+class Requirements:
+    """See above.
+
+    Parameters
+    ----------
+    region
+        Inputs that may be commanded; None: all of the box.
+    limits
+        Of further outputs, watched ones included.
+    level
+        Probability with which the answer has to keep all limits.
+    safety
+        Probability with which every trial has to keep them, after the initial points; None: trials may break them.
+    straying
+        The input noise of the trials themselves; None if they reach what is commanded.
+    noise
+        Observation noise of the outputs: "none" or "inferred".
+    """
+
+    def __init__(
+        self,
+        box: Box,
+        region: Region | None,
+        limits: tuple[Limit, ...],
+        *,
+        level: float,
+        safety: float | None,
+        ranking: Ranking,
+        straying: InputNoise | None,
+        noise: NoiseName,
+        lattice: Lattice | None,
+        seed: int,
+    ):
+        self.region: Final = region
+        self.limits: Final = limits
+        self.level: Final = level
+        self.safety: Final = safety
+        self._box: Final = box
+        self._ranking: Final = ranking
+        self._straying: Final = straying
+        self._noise: Final[NoiseName] = noise
+        self._lattice: Final = lattice
+        self._seed: Final = seed
+        self._limited: Final = tuple(k for k, limit in enumerate(limits) if not limit.watched)
+        self._models: Final = {k: self._model(GaussianProcess(noise=noise), k) for k in range(len(limits))}
+
+    def forget(self) -> None:
+        """Drop what was learnt: the trials are others from now on."""
+        for model in self._models.values():
+            model.forget()
+
+    # --- which trials are feasible --------------------------------------------------------------------------------
+
+    def probability(self, trials: Trials, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the probability (q,) that one execution at U (q, d) keeps all limits."""
+        return execution_probability(self._outputs(trials), self._ranking.accurate, U)
+
+    def feasibility(self, trials: Trials) -> NDArray[np.float64]:
+        """Return the probability (t,) that one execution where each trial was keeps all limits; 0 if not allowed.
+
+        Where inputs and observations are exact, what was told decides.
+        """
+        places, told = trials.places, trials.outputs[:, list(self._limited)]
+        found = np.ones(len(trials))
+        known = np.isfinite(told).all(axis=1) & (self._ranking.exact_inputs and not self._ranking.noisy)
+        if known.any():
+            found[known] = self._missed(told[known]).max(axis=1, initial=-np.inf) <= 0.0
+        if not known.all() and self._limited:
+            found[~known] = self.probability(trials, places[~known])
+        if self.region is not None and len(trials):
+            found[~self.region.contains(places)] = 0.0
+        return found
+
+    def feasible(self, trials: Trials) -> NDArray[np.bool_]:
+        """Tell which trials may become the answer, (t,)."""
+        return trials.eligible & (self.feasibility(trials) >= self.level)
+
+    def shortfall(self, trials: Trials) -> str:
+        """Return in words that nothing feasible is known, and what came nearest; empty where something is."""
+        if self.feasible(trials).any():
+            return ""
+        told = trials.outputs[:, list(self._limited)]
+        missed = self._missed(told)
+        measured = trials.successful & np.isfinite(missed).all(axis=1) & (len(self._limited) > 0)
+        start = f"no feasible trial in {len(trials)}"
+        if not measured.any():
+            return f"{start}."
+        nearest = int(np.argmin(np.where(measured, self._beyond(trials), np.inf)))
+        parts = [
+            f"missed {self.limits[k].name} by {amount:.3g}"
+            for k, amount in zip(self._limited, missed[nearest], strict=True)
+            if amount > 0.0
+        ]
+        if parts:
+            return f"{start}; the nearest {' and '.join(parts)}."
+        share = float(self.feasibility(trials)[trials.eligible].max(initial=0.0))
+        return f"{start}: of the likeliest, {share:.0%} of executions keep all limits, of {self.level:.0%} asked for."
+
+    def nearest(self, trials: Trials) -> History:
+        """Return the trial that is likeliest to be feasible, or misses least, as the only one: for want of a better.
+
+        Raises InputError if no allowed trial has given a value.
+        """
+        share = np.where(trials.eligible, self.feasibility(trials), -1.0)
+        if self.region is not None and not (trials.eligible & self.region.contains(trials.places)).any():
+            raise InputError("no trial at an allowed input has given a value yet; ask for one, and tell its outcome.")
+        best = share >= share.max() - 1e-12
+        if best.sum() > 1:  # all certainly infeasible: the one that misses least
+            beyond = self._beyond(trials)
+            best = np.arange(len(best)) == int(np.argmin(np.where(best & np.isfinite(beyond), beyond, np.inf)))
+        none = np.empty((0, self._box.dimension))
+        return History(trials.places[best], trials.modelled[best], none, none)
+
+    def described(
+        self, answer: Recommendation, trials: Trials, u: NDArray[np.float64], reached: Perturbations, sign: float
+    ) -> Recommendation:
+        """Return the answer at u (d,) with what is known of its outputs and of its feasibility."""
+        posteriors = self.posteriors(trials)
+        outputs = {name: execution_at(posterior, reached, u) for name, posterior in posteriors.items()}
+        tried = np.flatnonzero(trials.eligible & same(u, trials.places)) if self._ranking.exact_inputs else []
+        if len(tried):  # what was told there says more than the model, where observations are exact
+            share = float(self.feasibility(trials)[tried].max())
+        else:
+            share = float(execution_probability(self._outputs(trials), reached, u[None, :])[0])
+        highest = int(np.nanargmax(trials.values))
+        refused = answer.refused
+        if not self.feasible(trials)[highest]:
+            refused = self._why_refused(trials, highest, sign)
+        return replace(answer, feasible=share, infeasible=self.shortfall(trials), outputs=outputs, refused=refused)
+
+    def _why_refused(self, trials: Trials, k: int, sign: float) -> str:
+        what = "highest" if sign > 0.0 else "lowest"
+        start = f"The {what} observed trial gave {sign * trials.values[k]:.4g}, but "
+        missed = self._missed(trials.outputs[k : k + 1, list(self._limited)])[0]
+        parts = [f"{self.limits[i].name} by {m:.3g}" for i, m in zip(self._limited, missed, strict=True) if m > 0.0]
+        if parts:
+            return f"{start}missed {' and '.join(parts)}."
+        if self.region is not None and not self.region.contains(trials.places[k : k + 1])[0]:
+            return f"{start}is not allowed."
+        if not self._limited:
+            return f"{start}reached a place outside of the box."
+        share = float(self.probability(trials, trials.places[k : k + 1])[0])
+        return f"{start}only {share:.0%} of its executions are expected to keep all limits."
+
+    # --- where to search ------------------------------------------------------------------------------------------
+
+    def admission(self, trials: Trials) -> Admission:
+        """Return what the search for the next trial has to respect.
+
+        In safe mode, after SafeOpt (Sui et al. 2015), only inputs can be tried where the models say that a trial keeps
+        all limits with the probability `safety`. That holds as far as the models are right: they learn their length
+        scales from few trials, no bound on the outputs' smoothness is assumed, so that there is no proof, and of many
+        trials the share 1 - safety may fail. What cannot be reached through safe inputs is never found.
+        """
+        outputs = self._outputs(trials)
+        share = 1.0 - (1.0 - self.level) / max(len(self._limited), 1)
+        ranking = self._ranking
+        perturbations = Perturbations(exact(self._box.dimension)) if ranking.exact_inputs else ranking.coarse
+        within = tuple(Within(posterior, limit, perturbations, float(ndtri(share))) for posterior, limit in outputs)
+        safety = self.safety
+        if safety is None:
+            return Admission(self.region, within)
+        reached = ranking.accurate if self._straying is not None else Perturbations(exact(self._box.dimension))
+
+        def safe(U: NDArray[np.float64]) -> NDArray[np.bool_]:
+            return execution_probability(outputs, reached, U) >= safety
+
+        return Admission(self.region, within, safe)
+
+    def most_probable(self, trials: Trials, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return points of the cube (c, d), best first, that are likely to be feasible: for want of a feasible trial.
+
+        Raises SureholdError in safe mode, where that means that nothing is known to be safe.
+        """
+        if self.safety is not None:
+            raise SureholdError(
+                f"nothing is known to be safe: {self.shortfall(trials)} Give initial_points= that keep all limits."
+            )
+        anchors = trials.places[np.argsort(-self.feasibility(trials), kind="stable")[:ANCHORS]]
+        admission = self.admission(trials)
+        found = multistart(Likelihood(), Likelihood(), self._box.dimension, anchors, rng, None, admission)
+        if not len(trials.pending) or not len(found):
+            return found
+        far = np.linalg.norm(found[:, None] - trials.pending, axis=2).min(axis=1)
+        logs = admission.log_probability(found)[0] + np.log(-np.expm1(-0.5 * (far / APART) ** 2) + 1e-300)
+        return found[np.argsort(-logs, kind="stable")]
+
+    def strict(self, trials: Trials) -> Admission:
+        """Return what an answer has to respect that was never tried."""
+        outputs = self._outputs(trials)
+
+        def feasible(U: NDArray[np.float64]) -> NDArray[np.bool_]:
+            return execution_probability(outputs, self._ranking.accurate, U) >= self.level
+
+        return Admission(self.region, (), feasible if outputs else None)
+
+    def initial(self, design: NDArray[np.float64], first: NDArray[np.float64], rng: Any) -> NDArray[np.float64]:
+        """Return an initial design (n, d) whose points are allowed; `first` (k, d) come before it."""
+        return design if self.region is None else self.region.design(design, first, rng)
+
+    def otherwise(self, trials: Trials, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return a point (d,) to try where no candidate is left: a random one; in safe mode the safest tried one."""
+        if self.safety is not None:
+            return trials.places[int(np.argmax(np.where(trials.eligible, self.feasibility(trials), -1.0)))]
+        return rng.random(self._box.dimension) if self.region is None else self.region.draw(1, rng)[0]
+
+    # --- inside -------------------------------------------------------------------------------------------------
+
+    def posteriors(self, trials: Trials) -> dict[str, Posterior]:
+        """Return the models of all outputs that have been measured, watched ones included, by name."""
+        return {self.limits[k].name: self._posterior(trials, k) for k in self._measured(trials)}
+
+    def _outputs(self, trials: Trials) -> list[tuple[Posterior, Limit]]:
+        return [(self._posterior(trials, k), self.limits[k]) for k in self._measured(trials) if k in self._limited]
+
+    @staticmethod
+    def _measured(trials: Trials) -> list[int]:
+        return np.flatnonzero(np.isfinite(trials.outputs).any(axis=0)).tolist()
+
+    def _posterior(self, trials: Trials, k: int) -> Posterior:
+        told = trials.of_output(k)
+        if self.safety is None or self.limits[k].watched:
+            return self._models[k].posterior(told)
+        # Trials that all keep well within the limit show little of what the output may do elsewhere: until they show
+        # more, it may differ by as much as the limit is away.
+        limit, y = self.limits[k], told.values
+        away = min(abs(end - float(y.mean())) for end in (limit.lower, limit.upper) if np.isfinite(end))
+        wide = (float(y.mean()) - 2.0 * away, float(y.mean()) + 2.0 * away) if away > 0.0 else None
+        return self._model(GaussianProcess(noise=self._noise, output_range=wide), k).posterior(told)
+
+    def _model(self, surrogate: GaussianProcess, k: int) -> ResponseModel:
+        return ResponseModel(
+            surrogate,
+            self._box,
+            straying=self._straying,
+            lattice=self._lattice,
+            continues_chains=False,
+            seed=self._seed + 1 + k,
+            screened=False,
+        )
+
+    def _missed(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return by how much outputs (t, c) are beyond their limits, negative inside, (t, c)."""
+        columns = [self.limits[k].missed_by(told[:, i]) for i, k in enumerate(self._limited)]
+        return np.reshape(columns, (len(columns), len(told))).T
+
+    def _beyond(self, trials: Trials) -> NDArray[np.float64]:
+        """Return the largest miss of each trial in ranges of that output, (t,); NaN where not all was measured."""
+        told = trials.outputs[:, list(self._limited)]
+        measured = told[np.isfinite(told).all(axis=1)]
+        scale = np.ptp(measured, axis=0) if len(measured) else np.ones(told.shape[1])
+        return (np.maximum(self._missed(told), 0.0) / np.where(scale > 0.0, scale, 1.0)).max(axis=1, initial=0.0)
+
+
+def required(
+    box: Box,
+    allowed: Any,
+    limits: tuple[Limit, ...],
+    *,
+    level: float,
+    safety: float | None,
+    ranking: Ranking,
+    straying: InputNoise | None,
+    lattice: Lattice | None,
+    seed: int,
+    first: NDArray[np.float64],
+    preset: str | None,
+) -> Requirements | None:
+    """Return what these settings of an `Optimizer` require, None for nothing; `first` (k, d) are tried first.
+
+    Raises InputError for values out of range, settings that contradict each other, and a region without an input.
+    """
+    rules = checked_rules(allowed)
+    for name, value in (("feasible", level), ("safety", safety)):
+        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < 1):
+            raise InputError(f"{name} is {value!r}; give a probability strictly between 0 and 1, such as 0.95.")
+    if safety is not None and (all(limit.watched for limit in limits) or not len(first)):
+        raise InputError(
+            "safety= needs constraints= with a limit, and initial_points= that are known to keep all limits."
+        )
+    if not rules and not limits:
+        return None
+    if preset is not None:
+        raise InputError(
+            f"preset='{preset}' chooses trials as the thesis does, which knows no constraints; leave one out."
+        )
+    region = Region(box, rules, lattice, seed, first) if rules else None
+    if region is not None and not region.contains(first).all():
+        bad = first[~region.contains(first)][0]
+        raise InputError(f"initial_points hold {box.as_dict(box.from_unit(bad))}, which is not allowed.")
+    return Requirements(
+        box,
+        region,
+        limits,
+        level=level,
+        safety=safety,
+        ranking=ranking,
+        straying=straying,
+        noise="inferred" if ranking.noisy and straying is None else "none",
+        lattice=lattice,
+        seed=seed,
+    )
