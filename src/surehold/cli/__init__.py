@@ -7,7 +7,8 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 nothing came of it, 2 bad input, 130 interrupted with nothing to keep.
+    """Run the command line and exit: 0 done, 1 nothing came of it, 2 bad input, 3 no trial succeeded,
+    130 interrupted with nothing to keep.
 
     Every expected error is one line on the standard error stream.
     """
