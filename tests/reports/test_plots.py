@@ -74,5 +74,8 @@ def test_boxes_of_many_kinds_are_drawn(tmp_path):
     report = result_report(mixed, lambda p: abs(np.log(p["force"])) + (p["grip"] == "pinch"))
     assert report.choices["grip"][report.recommended.trial] == "power"
     assert report.recommended.mean < 0.2
-    assert len(mixed.optimizer.plot_slice({"force": 1.0, "grip": "power"}).axes) == 3
+    force, grip = mixed.optimizer.plot_slice({"force": 1.0, "grip": "power"}).axes
+    assert force.get_xscale() == "log"
+    assert force.get_xlim() == pytest.approx((0.1, 10.0))
+    assert [text.get_text() for text in grip.get_xticklabels()] == ["pinch", "power"]
     assert "force [log]" in mixed.report(tmp_path / "mixed").read_text(encoding="utf-8")
