@@ -84,6 +84,9 @@ def _draw_number(axes: Any, optimizer: Optimizer, center: NDArray[np.float64], v
     )
     axes.axvline(shown(center[k]), color=PALETTE["high"], linestyle=(0, (4, 2)), linewidth=1.1, label="the point")
     axes.set(xlabel=variable.name, xlim=(t[0], t[-1]), xscale="log" if variable.log else "linear")
+    if variable.log:
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter("")
 
 
 def _draw_choice(axes: Any, optimizer: Optimizer, center: NDArray[np.float64], variable: Choice) -> None:
