@@ -17,7 +17,7 @@ from joblib import Parallel, delayed
 import surehold as sh
 
 OBJECTS = ("mug", "bottle", "glass", "drill")
-SURROGATES = ("gp", "tgp", "local_global")
+SURROGATES = ("gp", "two_scales", "tgp", "local_global")
 POSES = 512
 
 

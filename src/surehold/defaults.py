@@ -133,6 +133,10 @@ LENGTH_SCALE_DEVIATION: Final = 1.0
 #: outputs; the noise is 0.1 of these in the median. Never measured.
 SIGNAL_VARIANCE_PRIOR: Final = (0.0, 1.5)
 NOISE_VARIANCE_PRIOR: Final = (log(1e-2), 3.0)
+#: Proportion of long to short length-scales, and log(w / (1 - w)) of the short part's share w of the signal variance:
+#: mean and standard deviation of the logarithms.
+PROPORTION_PRIOR: Final = (log(8.0), 0.7)
+SHARE_PRIOR: Final = (log(0.1), 1.5)
 #: Nugget, as a fraction of the signal variance: small, for observations are exact unless `noise` says otherwise.
 #: Never measured.
 NUGGET: Final = 1e-10

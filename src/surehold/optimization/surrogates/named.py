@@ -18,7 +18,7 @@ from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, l
 
 __all__ = ["SURROGATES", "refuse_settings", "surrogate_named"]
 
-SURROGATES: Final = ("gp", "tgp", "local_global")
+SURROGATES: Final = ("gp", "tgp", "local_global", "two_scales")
 
 
 def surrogate_named(
@@ -55,6 +55,8 @@ def surrogate_named(
                 "choose 'gp' or 'tgp'."
             )
         return LocalGlobalProcess(output_range)
+    if name == "two_scales":
+        return GaussianProcess(kernel="matern52_two_scales", noise=setting, output_range=output_range, mean_variance=1.0)
     process = GaussianProcess(noise=setting, output_range=output_range)
     if name == "gp":
         return process

@@ -5,6 +5,7 @@ Legend: theta (p,) = log length-scales (d), then log signal variance and log noi
 """
 
 from dataclasses import dataclass, fields
+from math import exp, log, pi
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ from surehold.defaults import (
     MODE_TOLERANCES,
     NOISE_VARIANCE_PRIOR,
     PARTICLES,
+    PROPORTION_PRIOR,
+    SHARE_PRIOR,
     SIGNAL_VARIANCE_PRIOR,
     SLICE_WIDTH,
     THIN,
@@ -25,6 +28,7 @@ from surehold.defaults import (
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.samplers.elliptical_slice import elliptical_slice_sample
 from surehold.optimization.samplers.slice import slice_sample
+from surehold.optimization.surrogates.gaussian_process.kernels import TWO_SCALES, kernel_number, shape_size
 from surehold.optimization.surrogates.gaussian_process.likelihood import (
     Evidence,
     log_posterior,
@@ -33,6 +37,8 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import (
 
 __all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "mode"]
 
+_SURE = 50.0  # differences of log evidences beyond which a model is out of the question
+_ABSENT = -50.0  # log(w / (1 - w)) of a short part that adds nothing in double precision
 _METHODS = ("elliptical_slice", "slice", "map")
 
 
@@ -46,6 +52,10 @@ class Prior:
     """in squared standard deviations of the outputs"""
     log_noise_variance: tuple[float, float] = NOISE_VARIANCE_PRIOR
     """in squared standard deviations of the outputs"""
+    log_proportion: tuple[float, float] = PROPORTION_PRIOR
+    """of long to short length-scales, where the kernel has two"""
+    logit_share: tuple[float, float] = SHARE_PRIOR
+    """log(w / (1 - w)) of the short part's share w of the signal variance, where there is one"""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -55,9 +65,12 @@ class Prior:
                     f"prior of {field.name} is ({mean}, {deviation}); give a mean and a positive deviation."
                 )
 
-    def vectors(self, d: int, signal: bool, noise: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def vectors(
+        self, d: int, signal: bool, noise: bool, kernel: int = 0
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return means and standard deviations (p,) of theta."""
         rows = [self.log_length_scale] * d
+        rows += [self.log_proportion, self.logit_share][: shape_size(kernel)]
         rows += [self.log_signal_variance] * signal + [self.log_noise_variance] * noise
         table = np.array(rows, dtype=np.float64)
         return np.ascontiguousarray(table[:, 0]), np.ascontiguousarray(table[:, 1])
@@ -112,12 +125,53 @@ def learn(
         start = np.ones(evidence.prior_mean.size) if previous is None else previous
         samples = slice_sample(log_posterior, evidence, start, rng, widths=learning.width, **counts)
         return Learnt(samples.states, samples.evaluations)
+    if evidence.kernel == TWO_SCALES:
+        return _learn_one_or_two_scales(evidence, learning, rng)
     center, evaluations = mode(evidence)
     if learning.method == "map":
         return Learnt(center[None, :], evaluations)
     root = _root_of_covariance(evidence, center)
     samples = elliptical_slice_sample(log_posterior, evidence, center, root, rng, **counts)
     return Learnt(samples.states, evaluations + center.size + 1 + samples.evaluations)
+
+
+def _learn_one_or_two_scales(evidence: Evidence, learning: Learning, rng: np.random.Generator) -> Learnt:
+    """Draw particles of two models, equally likely beforehand: both scales, and the long one alone.
+
+    Each has as many particles as its evidence p(y | model) says (Laplace's method, MacKay 2003, section 27), so that
+    a smooth function is modelled as if there were no second scale.
+    """
+    d = evidence.X.shape[1]
+    extra = [d, d + 1]
+    models = [
+        evidence._replace(
+            kernel=kernel_number("matern52"),
+            prior_mean=np.delete(evidence.prior_mean, extra),
+            prior_deviation=np.delete(evidence.prior_deviation, extra),
+        ),
+        evidence,
+    ]
+    modes = [mode(model) for model in models]
+    roots = [_root_of_covariance(model, center) for model, (center, _) in zip(models, modes, strict=True)]
+    logs = [
+        log_posterior(center, model) + np.linalg.slogdet(root)[1] + 0.5 * center.size * log(2.0 * pi)
+        for model, (center, _), root in zip(models, modes, roots, strict=True)
+    ]
+    both = 1.0 / (1.0 + exp(min(max(logs[0] - logs[1], -_SURE), _SURE)))
+    count = 1 if learning.method == "map" else learning.particles
+    shares = [count - round(both * count), round(both * count)]
+    states, evaluations = [], sum(cost + center.size + 1 for center, cost in modes)
+    for model, (center, _), root, keep in zip(models, modes, roots, shares, strict=True):
+        drawn = center[None, :]
+        if keep and learning.method != "map":
+            samples = elliptical_slice_sample(
+                log_posterior, model, center, root, rng, keep=keep, burn_in=learning.burn_in, thin=learning.thin
+            )
+            drawn, evaluations = samples.states, evaluations + samples.evaluations
+        if model is not evidence:
+            drawn = np.insert(drawn, extra[:1] * 2, (evidence.prior_mean[d], _ABSENT), axis=1)
+        states.append(drawn[:keep])
+    return Learnt(np.ascontiguousarray(np.concatenate(states)), evaluations)
 
 
 def _root_of_covariance(evidence: Evidence, center: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -146,7 +200,7 @@ def from_prior(evidence: Evidence, particles: int, rng: np.random.Generator) -> 
 def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
     """Return the mode of the log posterior (p,) and the number of evaluations it took.
 
-    Common length-scales on a coarse grid are tried first; the best one is refined by L-BFGS-B with the analytic
+    Common length-scales on a coarse grid, with a small and a larger share of the short part, are tried first; the best one is refined by L-BFGS-B with the analytic
     gradient.
     """
     from scipy.optimize import minimize
@@ -155,6 +209,10 @@ def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
     mean, deviation = evidence.prior_mean, evidence.prior_deviation
     starts = np.repeat(mean[None, :], len(MODE_STARTS), axis=0)
     starts[:, :d] += np.outer(MODE_STARTS, deviation[:d])
+    if evidence.kernel == TWO_SCALES:
+        rough = starts.copy()
+        rough[:, d + 1] += deviation[d + 1]
+        starts = np.concatenate([starts, rough])
     values = [log_posterior(start, evidence) for start in starts]
     best = int(np.argmax(values))
 
