@@ -60,7 +60,7 @@ def create(
     ] = "",
     seed: Annotated[int, typer.Option(help="Same seed, same suggestions.")] = 0,
     initial: Annotated[int | None, typer.Option(help="Trials of the initial design.")] = None,
-    surrogate: Annotated[str, typer.Option(help="gp or tgp; by default gp, and tgp from 400 trials on.")] = "",
+    surrogate: Annotated[str, typer.Option(help="two_scales (default), gp or tgp (default from 400 trials on).")] = "",
     criterion: Annotated[str, typer.Option(help="As in surehold.Optimizer.", show_default=False)] = "",
     risk: Annotated[str, typer.Option(help="mean, mean-std, var, cvar or worst.")] = "mean",
     observation_noise: Annotated[

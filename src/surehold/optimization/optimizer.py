@@ -54,7 +54,9 @@ class Optimizer:
     input_noise
         How far the reached input strays from the commanded one; None for inputs that are reached exactly.
     surrogate
-        "gp" (default), "tgp" (a treed Gaussian process, for functions that are smooth here and rough there),
+        "two_scales" (default without a preset: a Gaussian process that is the sum of a long and a short one, as far as
+        the trials show two scales), "gp" (one scale; default of the presets), "tgp" (a treed Gaussian process, for
+        functions that are smooth here and rough there),
         "local_global" (rough around a center that is learnt, smooth elsewhere; the fewest trials where little of the
         box matters, at three times the time; no observation noise), or an object such as `GaussianProcess(...)`: see
         `surrogates.protocol.Surrogate`. An object says by its attribute `noisy` whether observations carry noise;
@@ -76,7 +78,7 @@ class Optimizer:
     seed
         Non-negative integer.
     noise
-        Observation noise of "gp" and "tgp": "none" (what None, the default, stands for), its standard deviation in the
+        Observation noise of "two_scales", "gp" and "tgp": "none" (what None, the default, stands for), its standard deviation in the
         outputs' units, "inferred", or "heteroscedastic" (inferred, differing from place to place). A surrogate object
         and a thesis preset have their own: there it must be None, not given.
     output_range
@@ -103,7 +105,7 @@ class Optimizer:
         a simulator. True: trials stray, too. Those whose reached input is told (`tell(x, y, reached=...)`) are learnt
         from where they were; the others count as less precise where the function is steep (McHutchon and Rasmussen
         2011; left out where observation noise is inferred, which contains it). Needs a surrogate that takes the noise
-        of single trials: "gp", "tgp" or such an object.
+        of single trials: "two_scales", "gp", "tgp" or such an object.
     trust_region
         Whether the next trial is sought in a box around the best one that grows with success and shrinks without
         (after TuRBO): an option for six variables and more; off by default.
@@ -126,7 +128,7 @@ class Optimizer:
         *,
         direction: str = "maximize",
         input_noise: InputNoise | None = None,
-        surrogate: str | Surrogate = "gp",
+        surrogate: str | Surrogate | None = None,
         criterion: str | None = None,
         n_initial: int | None = None,
         initial_points: Any = None,
@@ -191,8 +193,8 @@ class Optimizer:
         takes_noise = isinstance(model, NoisySurrogate)
         if noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
             raise InputError(
-                "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials ('gp', "
-                "'tgp', or an object with known_noise), without a thesis preset."
+                "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials ('two_scales', "
+                "'gp', 'tgp', or an object with known_noise), without a thesis preset."
             )
         self._lattice = with_fixed(lattice, box, fixed)
         self._model = ResponseModel(

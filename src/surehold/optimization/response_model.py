@@ -11,7 +11,7 @@ from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.strategy.thesis import ThesisConstants
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
-from surehold.optimization.surrogates.named import refuse_settings, surrogate_named
+from surehold.optimization.surrogates.named import DEFAULT_SURROGATE, refuse_settings, surrogate_named
 from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate
 from surehold.optimization.trials import Trials
@@ -20,7 +20,7 @@ __all__ = ["ResponseModel", "chosen_surrogate"]
 
 
 def chosen_surrogate(
-    surrogate: str | Surrogate,
+    surrogate: str | Surrogate | None,
     *,
     preset: str | None,
     thesis: ThesisConstants | None,
@@ -32,11 +32,15 @@ def chosen_surrogate(
 ) -> Surrogate:
     """Return the surrogate that a name, an object or a thesis preset stands for.
 
+    None stands for "two_scales", and for the thesis' "gp" beside a preset.
+
     Raises InputError for an unknown name, and for settings beside an object or a preset, which have their own.
     """
     deviations = np.zeros(box.dimension)
     if input_noise is not None:
         deviations = np.sqrt(np.diag(input_noise.unit_covariance(box)))
+    if surrogate is None:
+        surrogate = DEFAULT_SURROGATE if thesis is None else "gp"
     if not isinstance(surrogate, str):
         refuse_settings("a surrogate object", noise, output_range)
         return surrogate

@@ -35,7 +35,7 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import (
     log_posterior_and_gradient,
 )
 
-__all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "mode"]
+__all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "log_evidence_and_root", "mode"]
 
 _SURE = 50.0  # differences of log evidences beyond which a model is out of the question
 _ABSENT = -50.0  # log(w / (1 - w)) of a short part that adds nothing in double precision
@@ -120,9 +120,9 @@ def learn(
 
     `previous` (p,) is the last particle of the posterior before, from which "slice" goes on.
     """
-    counts = {"keep": learning.particles, "burn_in": learning.burn_in, "thin": learning.thin}
     if learning.method == "slice":
         start = np.ones(evidence.prior_mean.size) if previous is None else previous
+        counts = {"keep": learning.particles, "burn_in": learning.burn_in, "thin": learning.thin}
         samples = slice_sample(log_posterior, evidence, start, rng, widths=learning.width, **counts)
         return Learnt(samples.states, samples.evaluations)
     if evidence.kernel == TWO_SCALES:
@@ -131,8 +131,7 @@ def learn(
     if learning.method == "map":
         return Learnt(center[None, :], evaluations)
     root = _root_of_covariance(evidence, center)
-    samples = elliptical_slice_sample(log_posterior, evidence, center, root, rng, **counts)
-    return Learnt(samples.states, evaluations + center.size + 1 + samples.evaluations)
+    return _around(evidence, learning, learning.particles, center, root, rng, evaluations + center.size + 1)
 
 
 def _learn_one_or_two_scales(evidence: Evidence, learning: Learning, rng: np.random.Generator) -> Learnt:
@@ -142,36 +141,51 @@ def _learn_one_or_two_scales(evidence: Evidence, learning: Learning, rng: np.ran
     a smooth function is modelled as if there were no second scale.
     """
     d = evidence.X.shape[1]
-    extra = [d, d + 1]
-    models = [
-        evidence._replace(
-            kernel=kernel_number("matern52"),
-            prior_mean=np.delete(evidence.prior_mean, extra),
-            prior_deviation=np.delete(evidence.prior_deviation, extra),
-        ),
-        evidence,
-    ]
-    modes = [mode(model) for model in models]
-    roots = [_root_of_covariance(model, center) for model, (center, _) in zip(models, modes, strict=True)]
-    logs = [
-        log_posterior(center, model) + np.linalg.slogdet(root)[1] + 0.5 * center.size * log(2.0 * pi)
-        for model, (center, _), root in zip(models, modes, roots, strict=True)
-    ]
-    both = 1.0 / (1.0 + exp(min(max(logs[0] - logs[1], -_SURE), _SURE)))
-    count = 1 if learning.method == "map" else learning.particles
-    shares = [count - round(both * count), round(both * count)]
-    states, evaluations = [], sum(cost + center.size + 1 for center, cost in modes)
-    for model, (center, _), root, keep in zip(models, modes, roots, shares, strict=True):
-        drawn = center[None, :]
-        if keep and learning.method != "map":
-            samples = elliptical_slice_sample(
-                log_posterior, model, center, root, rng, keep=keep, burn_in=learning.burn_in, thin=learning.thin
-            )
-            drawn, evaluations = samples.states, evaluations + samples.evaluations
-        if model is not evidence:
-            drawn = np.insert(drawn, extra[:1] * 2, (evidence.prior_mean[d], _ABSENT), axis=1)
-        states.append(drawn[:keep])
-    return Learnt(np.ascontiguousarray(np.concatenate(states)), evaluations)
+    long = evidence._replace(
+        kernel=kernel_number("matern52"),
+        prior_mean=np.delete(evidence.prior_mean, [d, d + 1]),
+        prior_deviation=np.delete(evidence.prior_deviation, [d, d + 1]),
+    )
+    (one, cost_one), (two, cost_two) = mode(long), mode(evidence)
+    log_one, root_one = log_evidence_and_root(long, one)
+    log_two, root_two = log_evidence_and_root(evidence, two)
+    cost = cost_one + cost_two + one.size + two.size + 2
+    two_scales = 1.0 / (1.0 + exp(min(max(log_one - log_two, -_SURE), _SURE)))
+    m = 1 if learning.method == "map" else learning.particles
+    keep = round(two_scales * m)
+    if learning.method == "map":
+        first, second = Learnt(one[None, :][: m - keep], cost), Learnt(two[None, :][:keep], 0)
+    else:
+        first = _around(long, learning, m - keep, one, root_one, rng, cost)
+        second = _around(evidence, learning, keep, two, root_two, rng)
+    shape = np.tile([evidence.prior_mean[d], _ABSENT], (m - keep, 1))
+    alone = np.column_stack([first.particles[:, :d], shape, first.particles[:, d:]])
+    return Learnt(np.concatenate([alone, second.particles]), first.evaluations + second.evaluations)
+
+
+def _around(
+    evidence: Evidence,
+    learning: Learning,
+    keep: int,
+    center: NDArray[np.float64],
+    root: NDArray[np.float64],
+    rng: np.random.Generator,
+    cost: int = 0,
+) -> Learnt:
+    """Draw `keep` particles by elliptical steps, starting at the mode (p,); `cost`: evaluations made before."""
+    if keep == 0:
+        return Learnt(np.empty((0, center.size)), cost)
+    samples = elliptical_slice_sample(
+        log_posterior, evidence, center, root, rng, keep=keep, burn_in=learning.burn_in, thin=learning.thin
+    )
+    return Learnt(samples.states, cost + samples.evaluations)
+
+
+def log_evidence_and_root(evidence: Evidence, center: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return about log p(y | X, model) by Laplace's method at the mode (p,), and the root of theta's covariance."""
+    root = _root_of_covariance(evidence, center)
+    volume = float(np.linalg.slogdet(root)[1]) + 0.5 * center.size * log(2.0 * pi)
+    return log_posterior(center, evidence) + volume, root
 
 
 def _root_of_covariance(evidence: Evidence, center: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -200,8 +214,8 @@ def from_prior(evidence: Evidence, particles: int, rng: np.random.Generator) -> 
 def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
     """Return the mode of the log posterior (p,) and the number of evaluations it took.
 
-    Common length-scales on a coarse grid, with a small and a larger share of the short part, are tried first; the best one is refined by L-BFGS-B with the analytic
-    gradient.
+    Common length-scales on a coarse grid are tried first, of two scales each with a small and a larger share of the
+    short part; the best one is refined by L-BFGS-B with the analytic gradient.
     """
     from scipy.optimize import minimize
 

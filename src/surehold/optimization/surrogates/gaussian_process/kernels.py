@@ -37,11 +37,11 @@ from surehold.store.kernels import njit
 
 __all__ = [
     "KERNELS",
+    "TWO_SCALES",
     "along",
     "correlation_and_factor",
     "cross_correlation",
     "kernel_number",
-    "TWO_SCALES",
     "self_correlation",
     "shape_size",
     "transposed",
