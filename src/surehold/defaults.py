@@ -133,10 +133,10 @@ LENGTH_SCALE_DEVIATION: Final = 1.0
 #: outputs; the noise is 0.1 of these in the median. Never measured.
 SIGNAL_VARIANCE_PRIOR: Final = (0.0, 1.5)
 NOISE_VARIANCE_PRIOR: Final = (log(1e-2), 3.0)
-#: Two scales: logarithm of the proportion of long to short length-scales, and log(w / (1 - w)) of the short part's share
-#: w of the signal variance: mean and standard deviation. Never measured against other values; the whole:
-#: python -m benchmarks.model_error --surrogates gp two_scales (grasps: error, coverage) and
-#: python -m benchmarks.smooth_regret --methods default gp (precision where there is one scale).
+#: Two scales: logarithm of the proportion of long to short length-scales, and log(w / (1 - w)) of the short part's
+#: share w of the signal variance: mean and standard deviation. Never measured against other values; the whole, on
+#: grasps and where there is one scale: python -m benchmarks.model_error --surrogates gp two_scales, and
+#: python -m benchmarks.smooth_regret --methods default gp.
 PROPORTION_PRIOR: Final = (log(8.0), 0.7)
 SHARE_PRIOR: Final = (log(0.1), 1.5)
 #: Prior variance of the constant mean of two scales, in squared standard deviations of the outputs: trials crowd where

@@ -78,9 +78,9 @@ class Optimizer:
     seed
         Non-negative integer.
     noise
-        Observation noise of "two_scales", "gp" and "tgp": "none" (what None, the default, stands for), its standard deviation in the
-        outputs' units, "inferred", or "heteroscedastic" (inferred, differing from place to place). A surrogate object
-        and a thesis preset have their own: there it must be None, not given.
+        Observation noise of "two_scales", "gp" and "tgp": "none" (what None, the default, stands for), its standard
+        deviation in the outputs' units, "inferred", or "heteroscedastic" (inferred, differing from place to place). A
+        surrogate object and a thesis preset have their own: there it must be None, not given.
     output_range
         (lowest, highest) value to expect, if known; None (default) where it is not, and beside a surrogate object or a
         thesis preset.
@@ -193,8 +193,8 @@ class Optimizer:
         takes_noise = isinstance(model, NoisySurrogate)
         if noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
             raise InputError(
-                "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials ('two_scales', "
-                "'gp', 'tgp', or an object with known_noise), without a thesis preset."
+                "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials "
+                "('two_scales', 'gp', 'tgp', or an object with known_noise), without a thesis preset."
             )
         self._lattice = with_fixed(lattice, box, fixed)
         self._model = ResponseModel(
