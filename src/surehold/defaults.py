@@ -179,6 +179,16 @@ VARYING_NOISE_LONGEST_STEP: Final = 2.0
 #: Rounds of learning and taking slopes where trials stray under the input noise; they settle in two. Never measured.
 SLOPE_ROUNDS: Final = 3
 
+# --- diagnosis of the model -------------------------------------------------------------------------------------------
+
+#: Points of a Sobol sequence that tell which share of the box is nearest to each trial; a power of two. Never measured.
+DIAGNOSIS_POINTS: Final = 1024
+#: Trials below which nothing is said against a model: there is too little to tell by. Never measured.
+DIAGNOSIS_LEAST: Final = 10
+#: Share of trials left out within their 95 % intervals below which a model counts as too sure. Never measured against
+#: other values; the shares themselves: python -m benchmarks.model_error.
+POOR_COVERAGE: Final = 0.8
+
 # --- surrogates: tree and mixture -------------------------------------------------------------------------------------
 
 #: Smallest number of trials in a leaf of the tree. The thesis has 8 to 20, by problem.

@@ -148,7 +148,7 @@ def recommend(name: Name, storage: Storage = "", as_json: Json = False) -> None:
     lines = [f"trial {best.trial}: expect {best.mean:.4g} ± {best.std:.2g}, 95 % better than {best.quantile:.4g}"]
     units = study.settings.units
     lines += [f"  {key} = {value} {units.get(key, '')}".rstrip() for key, value in best.parameters.items()]
-    lines += [best.refused] if best.refused else []
+    lines += [text for text in (best.refused, best.warning) if text]
     say(best.as_dict() | {"units": dict(units)}, "\n".join(lines), as_json)
 
 

@@ -17,6 +17,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
+from surehold.optimization.diagnosis import Diagnosis
 from surehold.optimization.lattice import Lattice, with_fixed
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
@@ -465,6 +466,7 @@ class Optimizer:
                 self._sign,
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
                 self._model.execution_noise,
+                "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
             )
 
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -477,6 +479,13 @@ class Optimizer:
         with single_threaded():
             mean, variance = mixture(perturbations.outcome(self.posterior, U))
         return self._sign * mean, np.sqrt(variance)
+
+    def diagnosis(self) -> Diagnosis | None:
+        """Return how well the model predicts each trial from the others; None where it cannot tell.
+
+        Raises InputError if no trial has given a value yet.
+        """
+        return self._model.diagnosis(self._trials)
 
     def promise(self) -> float:
         """Return the largest improvement that a further input is expected to bring, in the outputs' units.

@@ -6,6 +6,7 @@ import numpy as np
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
+from surehold.optimization.diagnosis import Diagnosis, diagnosis
 from surehold.optimization.lattice import Lattice, LatticePosterior
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.numerics.threads import single_threaded
@@ -113,6 +114,13 @@ class ResponseModel:
         previous = self._cache[1] if self._continues_chains and self._cache is not None else None
         rng = np.random.default_rng([self._seed, 1, len(trials) if self._continues_chains else 0])
         return self._surrogate.condition(trials.reached, trials.modelled, rng, previous)
+
+    def diagnosis(self, trials: Trials) -> Diagnosis | None:
+        """Return how well the model explains the trials told so far; None where it cannot tell."""
+        posterior = self.posterior(trials)
+        if isinstance(posterior, LatticePosterior):
+            posterior = posterior.unrounded
+        return diagnosis(posterior, trials.reached, trials.modelled)
 
     @property
     def execution_noise(self) -> float | None:

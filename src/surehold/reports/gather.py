@@ -152,6 +152,7 @@ def report_of(
         success_above=success_above,
         outcomes=outcomes or {},
         advice=advice,
+        warning=result.recommendation.warning,
         surfaces=surfaces_of(optimizer.posterior, box, noise, candidates[-1].x, shown),
         interrupted=result.interrupted,
         planned_trials=planned_trials,

@@ -45,6 +45,8 @@ class StudyRecommendation:
     """trials with a value that the recommendation rests on"""
     refused: str
     """why the best observed trial is not recommended; empty where it is"""
+    warning: str
+    """what is wrong with the model that all this rests on; empty where nothing is"""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -110,6 +112,7 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         sign * float(np.nanmax(history.y)),
         best.n,
         text if number != highest else "",
+        best.warning,
     )
 
 
@@ -127,6 +130,8 @@ def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> 
     ]
     if found.refused:
         lines += ["", f"Not trial {found.highest_trial}, the best observed one. {found.refused}"]
+    if found.warning:
+        lines += ["", found.warning]
     return "\n".join([*lines, "", _END])
 
 

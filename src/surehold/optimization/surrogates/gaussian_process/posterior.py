@@ -104,6 +104,11 @@ class GaussianProcessPosterior:
         """Return how much the trials after the first k contradict the particles, in standard deviations."""
         return surprise(self.factors.inverse_L, self._Y, k)
 
+    def left_out(self) -> Moments:
+        """Return means and variances (m, n) of each trial's value given all others, observation noise included."""
+        mean, variance = left_out(self.factors.inverse_L, self.factors.alpha, self._Y)
+        return Moments(self.outputs.shift + self.outputs.scale * mean, self.outputs.square * variance, None, None)
+
     @property
     def length_scales(self) -> NDArray[np.float64]:
         """Length-scales of the particles, (m, d), in widths of the unit cube."""
@@ -223,6 +228,17 @@ def _scales(theta: NDArray[np.float64], d: int, kernel: int) -> NDArray[np.float
     if not shape_size(kernel):
         return inverse_l
     return np.column_stack([inverse_l, np.exp(theta[:, d]), expit(theta[:, d + 1])])
+
+
+def left_out(
+    inverse_L: NDArray[np.float64], alpha: NDArray[np.float64], Y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return means and variances (m, n) of each output given all others (Rasmussen and Williams 2006, (5.12)).
+
+    inverse_L (m, n, n) are the inverse factors of the data's covariances A, alpha (m, n) is A^-1 y, Y (m, n) hold y.
+    """
+    precision = np.einsum("mij,mij->mj", inverse_L, inverse_L)  # diagonal of A^-1
+    return Y - alpha / precision, 1.0 / precision
 
 
 def surprise(inverse_L: NDArray[np.float64], Y: NDArray[np.float64], k: int) -> float:
