@@ -167,3 +167,10 @@ def test_without_any_success_nobody_wins():
     assert told.text.startswith("How they ended: 3 × no contact; 1 × not closed.")
     assert told.text.endswith("Try another --facet.")
     assert not told.refused
+
+
+def test_the_paragraph_ends_with_what_is_wrong_with_the_model():
+    candidates = (shaken("recommended", 3.0, 2.5 + 0.1 * SPREAD),)
+    told, warned = (verdict(report(*candidates, warning=warning)) for warning in ("", "The model is blind."))
+    assert warned.text == f"{told.text} The model is blind."
+    assert warned.headline == told.headline
