@@ -33,6 +33,7 @@ OURS = {
     "uei-thesis": {"criterion": "uei", "preset": "thesis"},
     "plain": None,
     "local-global": {"surrogate": "local_global"},
+    "gp": {"surrogate": "gp"},
 }
 GROUPS = {"1-2 variables": (1, 2), "3-4 variables": (3, 4), "5-6 variables": (5, 6), "7-8 variables": (7, 8)}
 

@@ -17,7 +17,7 @@ from joblib import Parallel, delayed
 import surehold as sh
 
 OBJECTS = ("mug", "bottle", "glass", "drill")
-SURROGATES = ("gp", "tgp", "local_global")
+SURROGATES = ("gp", "two_scales", "tgp", "local_global")
 POSES = 512
 
 
@@ -62,7 +62,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--objects", nargs="+", default=list(OBJECTS), choices=OBJECTS)
     parser.add_argument("--seeds", type=int, nargs="+", default=list(range(10)))
-    parser.add_argument("--surrogates", nargs="+", default=["gp", "tgp"], choices=SURROGATES)
+    parser.add_argument("--surrogates", nargs="+", default=["two_scales", "gp", "tgp"], choices=SURROGATES)
     parser.add_argument("--processes", type=int, default=2)
     arguments = parser.parse_args()
     cases = [(obj, seed) for obj in arguments.objects for seed in arguments.seeds]

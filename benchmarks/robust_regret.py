@@ -38,6 +38,7 @@ METHODS = {
     "tgp": {"surrogate": "tgp"},
     "tgp, UEI": {"surrogate": "tgp", "criterion": "uei"},
     "local-global": {"surrogate": "local_global"},
+    "gp": {"surrogate": "gp"},
     "local-global, UEI": {"surrogate": "local_global", "criterion": "uei"},
     "local-global Thompson": {"surrogate": "local_global", "criterion": "robust_thompson"},
     "cvar": {"risk": "cvar"},

@@ -69,7 +69,7 @@ def run(name: str, trials: int | None = None) -> list[float]:
     """Return the inputs of a run, trial by trial, and at its end the recommended input with mean and quantile."""
     problem_name, budget, settings = RUNS[name]
     problem = _problem(problem_name)
-    settings = dict(settings)
+    settings = {"surrogate": "gp", **settings}  # what was the default when the first results were stored
     if "input_noise" in settings:
         settings["input_noise"] = sh.InputNoise.unit(settings["input_noise"])
     n_initial = None if problem_name in OBJECTS else 6

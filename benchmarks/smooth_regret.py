@@ -21,7 +21,12 @@ from surehold.campaigns.methods import Surehold
 from surehold.campaigns.peers import installed_peers
 from surehold.problems.published import branin
 
-OURS = {"default": {}, "tgp": {"surrogate": "tgp"}, "local-global": {"surrogate": "local_global"}}
+OURS = {
+    "default": {},
+    "tgp": {"surrogate": "tgp"},
+    "local-global": {"surrogate": "local_global"},
+    "gp": {"surrogate": "gp"},
+}
 _LEAST = 1e-9
 
 

@@ -69,7 +69,7 @@ class GaussianProcessRegressor(_CubeRegressor):
     Parameters
     ----------
     kernel
-        "matern52" (default), "matern32", "squared_exponential" or "matern52_product".
+        "matern52" (default), "matern32", "squared_exponential", "matern52_product" or "matern52_two_scales".
     noise
         "inferred" (default), "heteroscedastic", "none", or a standard deviation in the outputs' units.
     method

@@ -49,7 +49,7 @@ def test_under_input_noise_one_execution_strays_and_the_mean_does_not():
 def test_straying_trials_do_not_count_the_input_noise_twice():
     noise = sh.InputNoise({"x": 0.05})
     rng = np.random.default_rng(3)
-    optimizer = sh.Optimizer(LINE, input_noise=noise, noise_while_exploring=True, seed=3)
+    optimizer = sh.Optimizer(LINE, input_noise=noise, noise_while_exploring=True, surrogate="gp", seed=3)
     X = rng.uniform(-1.0, 1.0, (60, 1))
     optimizer.restore(X, np.sin(6.0 * (X[:, 0] + 0.05 * rng.standard_normal(60))))
     best = optimizer.recommend()

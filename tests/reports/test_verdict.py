@@ -193,3 +193,10 @@ def test_minimizing_is_maximizing_seen_in_a_mirror(observed, answer):
     assert "highest" not in down.headline + down.text
     assert "falls" not in down.headline
     assert ("lowest dip" in down.headline) == ("highest peak" in up.headline)
+
+
+def test_the_paragraph_ends_with_what_is_wrong_with_the_model():
+    candidates = (shaken("recommended", 3.0, 2.5 + 0.1 * SPREAD),)
+    told, warned = (verdict(report(*candidates, warning=warning)) for warning in ("", "The model is blind."))
+    assert warned.text == f"{told.text} The model is blind."
+    assert warned.headline == told.headline

@@ -64,7 +64,7 @@ class Surehold:
     ):
         own = dict(settings)
         box = Box.unit(dimension)
-        if own.get("surrogate", "gp") == "tgp":
+        if own.get("surrogate") == "tgp":
             own["surrogate"] = _treed(own, box, input_noise, seed)
         options = {name: own.pop(name) for name in ("alpha", "beta") if name in own}
         if "risk" in own:

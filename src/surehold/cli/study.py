@@ -60,7 +60,7 @@ def create(
     ] = "",
     seed: Annotated[int, typer.Option(help="Same seed, same suggestions.")] = 0,
     initial: Annotated[int | None, typer.Option(help="Trials of the initial design.")] = None,
-    surrogate: Annotated[str, typer.Option(help="gp or tgp; by default gp, and tgp from 400 trials on.")] = "",
+    surrogate: Annotated[str, typer.Option(help="two_scales (default), gp or tgp (default from 400 trials on).")] = "",
     criterion: Annotated[str, typer.Option(help="As in surehold.Optimizer.", show_default=False)] = "",
     risk: Annotated[str, typer.Option(help="mean, mean-std, var, cvar or worst.")] = "mean",
     observation_noise: Annotated[
@@ -149,7 +149,7 @@ def recommend(name: Name, storage: Storage = "", as_json: Json = False) -> None:
     lines = [f"trial {best.trial}: expect {best.mean:.4g} ± {best.std:.2g}, 95 % better than {best.quantile:.4g}"]
     units = study.settings.units
     lines += [f"  {key} = {value} {units.get(key, '')}".rstrip() for key, value in best.parameters.items()]
-    lines += [best.refused] if best.refused else []
+    lines += [text for text in (best.refused, best.warning) if text]
     say(best.as_dict() | {"units": dict(units)}, "\n".join(lines), as_json)
 
 

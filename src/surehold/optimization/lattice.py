@@ -66,7 +66,7 @@ class LatticePosterior:
     """A posterior that is asked at the points of a lattice only."""
 
     def __init__(self, posterior: Posterior, lattice: Lattice):
-        self._posterior: Final = posterior
+        self.unrounded: Final = posterior
         self._lattice: Final = lattice
         self.diagnostics: FitDiagnostics = posterior.diagnostics
         self.regions: Regions = posterior.regions
@@ -82,11 +82,11 @@ class LatticePosterior:
         """Return the moments of sum_i weights[i] f(snap(query + offsets[i])) for each query."""
         points = self._lattice.snap(queries[:, None, :] + offsets)
         held = np.broadcast_to(1.0 if slopes is None else slopes, points.shape) * self._lattice.smooth
-        return self._posterior.average(queries, points - queries[:, None, :], weights, gradient, held)
+        return self.unrounded.average(queries, points - queries[:, None, :], weights, gradient, held)
 
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of f(snap(query)) for each query."""
-        moments = self._posterior.moments(self._lattice.snap(queries), gradient)
+        moments = self.unrounded.moments(self._lattice.snap(queries), gradient)
         if moments.mean_gradient is None or moments.variance_gradient is None:
             return moments
         smooth = self._lattice.smooth
@@ -96,16 +96,16 @@ class LatticePosterior:
 
     def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return joint draws (m, q, b, s) of f at the snapped points (q, s, d)."""
-        return self._posterior.sample(self._lattice.snap(points), normals)
+        return self.unrounded.sample(self._lattice.snap(points), normals)
 
     def thinned(self, count: int, first: int = 0) -> "LatticePosterior":
         """Return the posterior of about `count` of the particles, from number `first` on: a cheaper approximation."""
-        return LatticePosterior(self._posterior.thinned(count, first), self._lattice)
+        return LatticePosterior(self.unrounded.thinned(count, first), self._lattice)
 
     def with_pending(self, X: NDArray[np.float64]) -> "LatticePosterior":
         """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
-        return LatticePosterior(self._posterior.with_pending(self._lattice.snap(X)), self._lattice)
+        return LatticePosterior(self.unrounded.with_pending(self._lattice.snap(X)), self._lattice)
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance of the observation noise (q,) at the snapped X (q, d), in squared outputs."""
-        return self._posterior.noise_variance(self._lattice.snap(X))
+        return self.unrounded.noise_variance(self._lattice.snap(X))

@@ -152,7 +152,8 @@ class Result:
             (name, f"{getattr(self.recommendation, name):.6g}") for name in ("mean", "std", "quantile", "observed")
         ]
         cells = "".join(f"<tr><th>{escape(name)}</th><td>{value}</td></tr>" for name, value in rows)
-        refused = f"<p>{escape(self.recommendation.refused)}</p>" if self.recommendation.refused else ""
+        said = (self.recommendation.refused, self.recommendation.warning)
+        refused = "".join(f"<p>{escape(text)}</p>" for text in said if text)
         return f"<table><caption>Recommended after {len(self.y)} trials</caption>{cells}</table>{refused}"
 
 

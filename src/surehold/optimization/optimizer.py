@@ -17,6 +17,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
+from surehold.optimization.diagnosis import Diagnosis
 from surehold.optimization.lattice import lattice_of
 from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
@@ -60,7 +61,9 @@ class Optimizer:
     input_noise
         How far the reached input strays from the commanded one; None for inputs that are reached exactly.
     surrogate
-        "gp" (default), "tgp" (a treed Gaussian process, for functions that are smooth here and rough there),
+        "two_scales" (default without a preset: a Gaussian process that is the sum of a long and a short one, as far as
+        the trials show two scales), "gp" (one scale; default of the presets), "tgp" (a treed Gaussian process, for
+        functions that are smooth here and rough there),
         "local_global" (rough around a center that is learnt, smooth elsewhere; the fewest trials where little of the
         box matters, at three times the time; no observation noise), or an object such as `GaussianProcess(...)`: see
         `surrogates.protocol.Surrogate`. An object says by its attribute `noisy` whether observations carry noise;
@@ -82,9 +85,9 @@ class Optimizer:
     seed
         Non-negative integer.
     noise
-        Observation noise of "gp" and "tgp": "none" (what None, the default, stands for), its standard deviation in the
-        outputs' units, "inferred", or "heteroscedastic" (inferred, differing from place to place). A surrogate object
-        and a thesis preset have their own: there it must be None, not given.
+        Observation noise of "two_scales", "gp" and "tgp": "none" (what None, the default, stands for), its standard
+        deviation in the outputs' units, "inferred", or "heteroscedastic" (inferred, differing from place to place). A
+        surrogate object and a thesis preset have their own: there it must be None, not given.
     output_range
         (lowest, highest) value to expect, if known; None (default) where it is not, and beside a surrogate object or a
         thesis preset.
@@ -109,7 +112,7 @@ class Optimizer:
         a simulator. True: trials stray, too. Those whose reached input is told (`tell(x, y, reached=...)`) are learnt
         from where they were; the others count as less precise where the function is steep (McHutchon and Rasmussen
         2011; left out where observation noise is inferred, which contains it). Needs a surrogate that takes the noise
-        of single trials: "gp", "tgp" or such an object.
+        of single trials: "two_scales", "gp", "tgp" or such an object.
     trust_region
         Whether the next trial is sought in a box around the best one that grows with success and shrinks without
         (after TuRBO): an option for six variables and more; off by default.
@@ -144,7 +147,7 @@ class Optimizer:
         *,
         direction: str = "maximize",
         input_noise: InputNoise | None = None,
-        surrogate: str | Surrogate = "gp",
+        surrogate: str | Surrogate | None = None,
         criterion: str | None = None,
         n_initial: int | None = None,
         initial_points: Any = None,
@@ -213,8 +216,8 @@ class Optimizer:
         takes_noise = isinstance(model, NoisySurrogate)
         if noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
             raise InputError(
-                "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials ('gp', "
-                "'tgp', or an object with known_noise), without a thesis preset."
+                "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials "
+                "('two_scales', 'gp', 'tgp', or an object with known_noise), without a thesis preset."
             )
         self._lattice = lattice_of(box, fixed)
         self._model = ResponseModel(
@@ -545,6 +548,7 @@ class Optimizer:
                 self._sign,
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
                 self._model.execution_noise,
+                "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
             )
             if self._requirements is None:
                 return answer
@@ -560,6 +564,13 @@ class Optimizer:
         with single_threaded():
             mean, variance = mixture(perturbations.outcome(self.posterior, U))
         return self._sign * mean, np.sqrt(variance)
+
+    def diagnosis(self) -> Diagnosis | None:
+        """Return how well the model predicts each trial from the others; None where it cannot tell.
+
+        Raises InputError if no trial has given a value yet.
+        """
+        return self._model.diagnosis(self._trials)
 
     def promise(self) -> float:
         """Return the largest improvement that a further input is expected to bring, in the outputs' units.

@@ -86,6 +86,8 @@ class Recommendation:
         Standard deviation, over the input noise, of the model's mean: the risk left to take; unscented variance (4.1).
     refused
         Why the best observed trial was not recommended; empty where it was.
+    warning
+        What is wrong with the model that all this rests on, see `diagnosis.Diagnosis`; empty where nothing is.
     outliers
         Trials, from 0 in the order told, whose values are too far on the bad side of all others to be believed.
     execution : Outcome
@@ -111,6 +113,7 @@ class Recommendation:
     n: int
     outcome_std: float
     refused: str
+    warning: str
     outliers: tuple[int, ...]
     execution: Outcome
     expectation: Outcome
@@ -171,6 +174,7 @@ def recommendation(
     sign: float = 1.0,
     outliers: tuple[int, ...] = (),
     noise_variance: float | None = None,
+    warning: str = "",
 ) -> Recommendation:
     """Describe u (d,) of the unit cube; `highest` is the best observed trial and its value.
 
@@ -203,6 +207,7 @@ def recommendation(
         n,
         unit * float(np.sqrt(max(variance, 0.0))),
         refused,
+        warning,
         outliers,
         Outcome(sign * outcome.means, outcome.stds),
         Outcome(sign * expectation.means, expectation.stds),

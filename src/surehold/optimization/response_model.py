@@ -6,12 +6,13 @@ import numpy as np
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
+from surehold.optimization.diagnosis import Diagnosis, diagnosis
 from surehold.optimization.lattice import Lattice, LatticePosterior
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.strategy.thesis import ThesisConstants
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
-from surehold.optimization.surrogates.named import refuse_settings, surrogate_named
+from surehold.optimization.surrogates.named import DEFAULT_SURROGATE, refuse_settings, surrogate_named
 from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate
 from surehold.optimization.trials import Trials
@@ -20,7 +21,7 @@ __all__ = ["ResponseModel", "chosen_surrogate"]
 
 
 def chosen_surrogate(
-    surrogate: str | Surrogate,
+    surrogate: str | Surrogate | None,
     *,
     preset: str | None,
     thesis: ThesisConstants | None,
@@ -32,11 +33,15 @@ def chosen_surrogate(
 ) -> Surrogate:
     """Return the surrogate that a name, an object or a thesis preset stands for.
 
+    None stands for "two_scales", and for the thesis' "gp" beside a preset.
+
     Raises InputError for an unknown name, and for settings beside an object or a preset, which have their own.
     """
     deviations = np.zeros(box.dimension)
     if input_noise is not None:
         deviations = np.sqrt(np.diag(input_noise.unit_covariance(box)))
+    if surrogate is None:
+        surrogate = DEFAULT_SURROGATE if thesis is None else "gp"
     if not isinstance(surrogate, str):
         refuse_settings("a surrogate object", noise, output_range)
         return surrogate
@@ -112,6 +117,13 @@ class ResponseModel:
         previous = self._cache[1] if self._continues_chains and self._cache is not None else None
         rng = np.random.default_rng([self._seed, 1, len(trials) if self._continues_chains else 0])
         return self._surrogate.condition(trials.reached, values, rng, previous)
+
+    def diagnosis(self, trials: Trials) -> Diagnosis | None:
+        """Return how well the model explains the trials told so far; None where it cannot tell."""
+        posterior = self.posterior(trials)
+        if isinstance(posterior, LatticePosterior):
+            posterior = posterior.unrounded
+        return diagnosis(posterior, trials.reached, trials.modelled)
 
     @property
     def execution_noise(self) -> float | None:

@@ -154,6 +154,7 @@ def report_of(
         outcomes=outcomes or {},
         advice=advice,
         surfaces=surfaces_of(optimizer, noise, [c.x for c in candidates], shown),
+        warning=result.recommendation.warning,
         interrupted=result.interrupted,
         planned_trials=planned_trials,
         notes=(*notes, *filter(None, [outliers_in_words(result.recommendation.outliers)])),

@@ -180,6 +180,7 @@ class RunReport:
     success_above: float | None = None  #: what a trial that succeeds is worth more than; None where any value will do
     outcomes: Mapping[str, int] = field(default_factory=dict)  #: how many trials ended how, where none succeeded
     advice: str = ""  #: what to try where no trial succeeded
+    warning: str = ""  #: what is wrong with the model that the recommendation rests on
     surfaces: tuple[Surface, ...] = ()
     interrupted: bool = False
     planned_trials: int | None = None

@@ -1,7 +1,7 @@
 """The verdict of a run in words, made from its numbers: why the highest peak was refused, or why not."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -48,7 +48,12 @@ def coordinates(report: RunReport, candidate: Candidate) -> str:
 
 
 def verdict(report: RunReport) -> Verdict:
-    """Return headline and paragraph for a run."""
+    """Return headline and paragraph for a run; the paragraph ends with what is wrong with the model."""
+    found = _of_the_run(report)
+    return replace(found, text=f"{found.text} {report.warning}".strip())
+
+
+def _of_the_run(report: RunReport) -> Verdict:
     highest, answer = report.observed, report.recommended
     extreme, peak = report.extreme, "lowest dip" if report.minimized else "highest peak"
     falls = "rises" if report.minimized else "falls"

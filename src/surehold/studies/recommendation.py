@@ -48,6 +48,8 @@ class StudyRecommendation:
     """why the best observed trial is not recommended; empty where it is"""
     outliers: tuple[int, ...] = ()
     """numbers of the trials whose values are too far on the bad side of all others to be believed"""
+    warning: str = ""
+    """what is wrong with the model that all this rests on; empty where nothing is"""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -111,6 +113,7 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         best.n,
         best.refused if number != best_number else "",
         tuple(int(history.numbers[i]) for i in best.outliers),
+        best.warning,
     )
 
 
@@ -131,6 +134,8 @@ def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> 
         lines += ["", f"Not trial {found.best_trial}, the best observed one. {found.refused}"]
     if found.outliers:
         lines += ["", outliers_in_words(found.outliers)]
+    if found.warning:
+        lines += ["", found.warning]
     return "\n".join([*lines, "", _END])
 
 

@@ -51,8 +51,8 @@ class Sampler(BaseSampler):
     seed
         Non-negative integer.
     surrogate
-        As in `Optimizer`; None (default) is a Gaussian process, and from 400 trials on a treed one, which can carry
-        tens of thousands.
+        As in `Optimizer`; None (default) is its default, and from 400 trials on a treed Gaussian process, which can
+        carry tens of thousands.
     warn_independent_sampling
         Whether to warn when a parameter is drawn at random because it is not in the search space.
     **settings
@@ -212,10 +212,8 @@ class Sampler(BaseSampler):
             raise InputError("the sampler has no search space of its own; give one at its construction.")
         return self._space
 
-    def _surrogate_for(self, trials: int) -> str | Surrogate:
-        if self._surrogate is not None:
-            return self._surrogate
-        return "gp" if trials < _MANY else "tgp"
+    def _surrogate_for(self, trials: int) -> str | Surrogate | None:
+        return "tgp" if self._surrogate is None and trials >= _MANY else self._surrogate
 
     def _new_optimizer(self, space: SearchSpace, trials: int, direction: str) -> Optimizer:
         if space.box is None:

@@ -164,7 +164,7 @@ def told(**settings):
 
 
 def test_an_object_with_inferred_noise_acts_as_the_named_surrogate():
-    named, given = told(noise="inferred"), told(surrogate=GaussianProcess(noise="inferred"))
+    named, given = told(surrogate="gp", noise="inferred"), told(surrogate=GaussianProcess(noise="inferred"))
     assert np.array_equal(named.X, given.X)
     assert np.array_equal(named.recommend().x, given.recommend().x)
     highest = given.X[np.argmax(given.y)]
@@ -182,7 +182,7 @@ class Plain:
 
 
 def test_an_object_that_says_nothing_takes_observations_for_exact():
-    plain, exact = told(surrogate=Plain()), told()
+    plain, exact = told(surrogate=Plain()), told(surrogate="gp")
     assert np.array_equal(plain.X, exact.X)
     assert plain.recommend().observed == plain.y.max()
     with pytest.raises(InputError, match="noise_while_exploring needs"):

@@ -28,7 +28,7 @@ from surehold.optimization.surrogates.gaussian_process.kernels import correlatio
 from surehold.optimization.surrogates.gaussian_process.likelihood import EVIDENCE_TYPE
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, fingerprint, learnt_from
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
-from surehold.optimization.surrogates.gaussian_process.posterior import surprise
+from surehold.optimization.surrogates.gaussian_process.posterior import left_out, surprise
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
 from surehold.store.kernels import njit
 
@@ -265,6 +265,13 @@ class LocalGlobalPosterior:
             for p, b in zip(self._particles, believed, strict=True)
         ]
         return LocalGlobalPosterior(together, particles, self._outputs, self.diagnostics.evaluations)
+
+    def left_out(self) -> Moments:
+        """Return means and variances (m, n) of each trial's value given all others."""
+        stacked = [np.array([getattr(p, name) for p in self._particles]) for name in ("inverse_L", "alpha", "y")]
+        mean, variance = left_out(*stacked)
+        outputs = self._outputs
+        return Moments(outputs.shift + outputs.scale * mean, outputs.square * variance, None, None)
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance of the observation noise (m, q): 0, for observations are exact."""

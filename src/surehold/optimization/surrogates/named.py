@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import CONSTANT_MEAN_VARIANCE
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.surrogates.gaussian_process.model import (
     GaussianProcess,
@@ -16,9 +17,10 @@ from surehold.optimization.surrogates.local_global import LocalGlobalProcess
 from surehold.optimization.surrogates.protocol import Surrogate
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, least_leaf_width
 
-__all__ = ["SURROGATES", "refuse_settings", "surrogate_named"]
+__all__ = ["DEFAULT_SURROGATE", "SURROGATES", "refuse_settings", "surrogate_named"]
 
-SURROGATES: Final = ("gp", "tgp", "local_global")
+SURROGATES: Final = ("two_scales", "gp", "tgp", "local_global")
+DEFAULT_SURROGATE: Final = "two_scales"
 
 
 def surrogate_named(
@@ -52,9 +54,13 @@ def surrogate_named(
         if setting not in ("none", 0.0):
             raise InputError(
                 f"noise is {noise!r}, but the surrogate 'local_global' takes exact observations; leave noise= out, or "
-                "choose 'gp' or 'tgp'."
+                "choose 'two_scales', 'gp' or 'tgp'."
             )
         return LocalGlobalProcess(output_range)
+    if name == "two_scales":
+        return GaussianProcess(
+            kernel="matern52_two_scales", noise=setting, output_range=output_range, mean_variance=CONSTANT_MEAN_VARIANCE
+        )
     process = GaussianProcess(noise=setting, output_range=output_range)
     if name == "gp":
         return process

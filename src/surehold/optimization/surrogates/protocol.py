@@ -15,6 +15,7 @@ _LARGEST = 1e150  # the square of a larger number is infinite
 
 __all__ = [
     "FitDiagnostics",
+    "LeavesOut",
     "Moments",
     "NoisySurrogate",
     "PartitionSummary",
@@ -169,6 +170,18 @@ class NoisySurrogate(Surrogate, Protocol):
         noise: NDArray[np.float64] | None = None,
     ) -> Posterior:
         """Learn from X (n, d), y (n,) and known standard deviations of the observations (n,)."""
+        ...
+
+
+@runtime_checkable
+class LeavesOut(Protocol):
+    """A posterior that can say what it would think of each of its trials without it."""
+
+    def left_out(self) -> Moments:
+        """Return means and variances (m, n) of each trial's value given all other trials, observation noise included.
+
+        The hyperparameters stay those that were learnt from all.
+        """
         ...
 
 

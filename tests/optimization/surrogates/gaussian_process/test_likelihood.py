@@ -6,7 +6,7 @@ from scipy.stats import norm
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
-from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, kernel_number
+from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, kernel_number, shape_size
 from surehold.optimization.surrogates.gaussian_process.likelihood import (
     Evidence,
     log_posterior,
@@ -30,7 +30,7 @@ def evidence_of(X, y, *, kernel="matern52", offsets=None, weights=None, **change
         "learn_noise": False,
         "noise": np.zeros(len(y)),
     } | changes
-    p = d + settings["learn_signal"] + settings["learn_noise"]
+    p = d + shape_size(kernel_number(kernel)) + settings["learn_signal"] + settings["learn_noise"]
     return Evidence(
         X=X,
         y=y,
@@ -104,7 +104,8 @@ def test_gradient(kernel, signal, inferred, data):
         offsets=[0, 15, 25],
         weights=[1.0, 0.6],
     )
-    theta = np.log([0.4, 0.9, 2.0, 0.02])[: 2 + signal + inferred]
+    shape = np.array([np.log(5.0), -1.0])[: shape_size(kernel_number(kernel))]
+    theta = np.concatenate([np.log([0.4, 0.9]), shape, np.log([2.0, 0.02])[: signal + inferred]])
     value, gradient = log_posterior_and_gradient(theta, evidence)
     assert value == pytest.approx(log_posterior(theta, evidence), abs=1e-9)
     h = 1e-5

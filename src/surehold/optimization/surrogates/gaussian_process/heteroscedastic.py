@@ -27,6 +27,7 @@ from surehold.defaults import (
     VARYING_NOISE_VARIANCE_PRIOR,
 )
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Prior, mode
+from surehold.optimization.surrogates.gaussian_process.kernels import TWO_SCALES
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
@@ -57,7 +58,7 @@ def most_likely_noise(evidence: Evidence) -> tuple[NDArray[np.float64], Gaussian
         signal_variance=1.0,
         ratio=1e-6,
         mean_variance=25.0,
-        kernel=evidence.kernel,
+        kernel=0 if evidence.kernel == TWO_SCALES else evidence.kernel,  # noise varies at one scale
         learn_signal=True,
         learn_noise=False,
     )

@@ -5,6 +5,7 @@ Legend: theta (p,) = log length-scales (d), then log signal variance and log noi
 """
 
 from dataclasses import dataclass, fields
+from math import exp, log, pi
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ from surehold.defaults import (
     MODE_TOLERANCES,
     NOISE_VARIANCE_PRIOR,
     PARTICLES,
+    PROPORTION_PRIOR,
+    SHARE_PRIOR,
     SIGNAL_VARIANCE_PRIOR,
     SLICE_WIDTH,
     THIN,
@@ -25,14 +28,17 @@ from surehold.defaults import (
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.samplers.elliptical_slice import elliptical_slice_sample
 from surehold.optimization.samplers.slice import slice_sample
+from surehold.optimization.surrogates.gaussian_process.kernels import TWO_SCALES, kernel_number, shape_size
 from surehold.optimization.surrogates.gaussian_process.likelihood import (
     Evidence,
     log_posterior,
     log_posterior_and_gradient,
 )
 
-__all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "mode"]
+__all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "log_evidence_and_root", "mode"]
 
+_SURE = 50.0  # differences of log evidences beyond which a model is out of the question
+_ABSENT = -50.0  # log(w / (1 - w)) of a short part that adds nothing in double precision
 _METHODS = ("elliptical_slice", "slice", "map")
 
 
@@ -46,6 +52,10 @@ class Prior:
     """in squared standard deviations of the outputs"""
     log_noise_variance: tuple[float, float] = NOISE_VARIANCE_PRIOR
     """in squared standard deviations of the outputs"""
+    log_proportion: tuple[float, float] = PROPORTION_PRIOR
+    """of long to short length-scales, where the kernel has two"""
+    logit_share: tuple[float, float] = SHARE_PRIOR
+    """log(w / (1 - w)) of the short part's share w of the signal variance, where there is one"""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -55,9 +65,12 @@ class Prior:
                     f"prior of {field.name} is ({mean}, {deviation}); give a mean and a positive deviation."
                 )
 
-    def vectors(self, d: int, signal: bool, noise: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def vectors(
+        self, d: int, signal: bool, noise: bool, kernel: int = 0
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return means and standard deviations (p,) of theta."""
         rows = [self.log_length_scale] * d
+        rows += [self.log_proportion, self.logit_share][: shape_size(kernel)]
         rows += [self.log_signal_variance] * signal + [self.log_noise_variance] * noise
         table = np.array(rows, dtype=np.float64)
         return np.ascontiguousarray(table[:, 0]), np.ascontiguousarray(table[:, 1])
@@ -107,17 +120,72 @@ def learn(
 
     `previous` (p,) is the last particle of the posterior before, from which "slice" goes on.
     """
-    counts = {"keep": learning.particles, "burn_in": learning.burn_in, "thin": learning.thin}
     if learning.method == "slice":
         start = np.ones(evidence.prior_mean.size) if previous is None else previous
+        counts = {"keep": learning.particles, "burn_in": learning.burn_in, "thin": learning.thin}
         samples = slice_sample(log_posterior, evidence, start, rng, widths=learning.width, **counts)
         return Learnt(samples.states, samples.evaluations)
+    if evidence.kernel == TWO_SCALES:
+        return _learn_one_or_two_scales(evidence, learning, rng)
     center, evaluations = mode(evidence)
     if learning.method == "map":
         return Learnt(center[None, :], evaluations)
     root = _root_of_covariance(evidence, center)
-    samples = elliptical_slice_sample(log_posterior, evidence, center, root, rng, **counts)
-    return Learnt(samples.states, evaluations + center.size + 1 + samples.evaluations)
+    return _around(evidence, learning, learning.particles, center, root, rng, evaluations + center.size + 1)
+
+
+def _learn_one_or_two_scales(evidence: Evidence, learning: Learning, rng: np.random.Generator) -> Learnt:
+    """Draw particles of two models, equally likely beforehand: both scales, and the long one alone.
+
+    Each has as many particles as its evidence p(y | model) says (Laplace's method, MacKay 2003, section 27), so that
+    a smooth function is modelled as if there were no second scale.
+    """
+    d = evidence.X.shape[1]
+    long = evidence._replace(
+        kernel=kernel_number("matern52"),
+        prior_mean=np.delete(evidence.prior_mean, [d, d + 1]),
+        prior_deviation=np.delete(evidence.prior_deviation, [d, d + 1]),
+    )
+    (one, cost_one), (two, cost_two) = mode(long), mode(evidence)
+    log_one, root_one = log_evidence_and_root(long, one)
+    log_two, root_two = log_evidence_and_root(evidence, two)
+    cost = cost_one + cost_two + one.size + two.size + 2
+    two_scales = 1.0 / (1.0 + exp(min(max(log_one - log_two, -_SURE), _SURE)))
+    m = 1 if learning.method == "map" else learning.particles
+    keep = round(two_scales * m)
+    if learning.method == "map":
+        first, second = Learnt(one[None, :][: m - keep], cost), Learnt(two[None, :][:keep], 0)
+    else:
+        first = _around(long, learning, m - keep, one, root_one, rng, cost)
+        second = _around(evidence, learning, keep, two, root_two, rng)
+    shape = np.tile([evidence.prior_mean[d], _ABSENT], (m - keep, 1))
+    alone = np.column_stack([first.particles[:, :d], shape, first.particles[:, d:]])
+    return Learnt(np.concatenate([alone, second.particles]), first.evaluations + second.evaluations)
+
+
+def _around(
+    evidence: Evidence,
+    learning: Learning,
+    keep: int,
+    center: NDArray[np.float64],
+    root: NDArray[np.float64],
+    rng: np.random.Generator,
+    cost: int = 0,
+) -> Learnt:
+    """Draw `keep` particles by elliptical steps, starting at the mode (p,); `cost`: evaluations made before."""
+    if keep == 0:
+        return Learnt(np.empty((0, center.size)), cost)
+    samples = elliptical_slice_sample(
+        log_posterior, evidence, center, root, rng, keep=keep, burn_in=learning.burn_in, thin=learning.thin
+    )
+    return Learnt(samples.states, cost + samples.evaluations)
+
+
+def log_evidence_and_root(evidence: Evidence, center: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return about log p(y | X, model) by Laplace's method at the mode (p,), and the root of theta's covariance."""
+    root = _root_of_covariance(evidence, center)
+    volume = float(np.linalg.slogdet(root)[1]) + 0.5 * center.size * log(2.0 * pi)
+    return log_posterior(center, evidence) + volume, root
 
 
 def _root_of_covariance(evidence: Evidence, center: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -146,8 +214,8 @@ def from_prior(evidence: Evidence, particles: int, rng: np.random.Generator) -> 
 def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
     """Return the mode of the log posterior (p,) and the number of evaluations it took.
 
-    Common length-scales on a coarse grid are tried first; the best one is refined by L-BFGS-B with the analytic
-    gradient.
+    Common length-scales on a coarse grid are tried first, of two scales each with a small and a larger share of the
+    short part; the best one is refined by L-BFGS-B with the analytic gradient.
     """
     from scipy.optimize import minimize
 
@@ -155,6 +223,10 @@ def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
     mean, deviation = evidence.prior_mean, evidence.prior_deviation
     starts = np.repeat(mean[None, :], len(MODE_STARTS), axis=0)
     starts[:, :d] += np.outer(MODE_STARTS, deviation[:d])
+    if evidence.kernel == TWO_SCALES:
+        rough = starts.copy()
+        rough[:, d + 1] += deviation[d + 1]
+        starts = np.concatenate([starts, rough])
     values = [log_posterior(start, evidence) for start in starts]
     best = int(np.argmax(values))
 

@@ -19,6 +19,11 @@ With g, every derivative that is needed has no singularity:
 The product form multiplies one-dimensional Matern-5/2 correlations c_i (thesis (3.2) as printed). There g stands for c
 itself, and both derivatives take the factor h_i = g_i / c_i of their dimension besides (`along`; 1 for the others):
     Matern-5/2, product   c = prod_i (1 + r_i + r_i^2/3) exp(-r_i),  r_i = sqrt(5) |q_i - x_i| / l_i
+
+The form of two scales is the sum of a long and a short process, independent of each other, whose length-scales are in
+one proportion a in all dimensions; w is the share of the short one:
+    Matern-5/2, two scales  c = (1 - w) c_long(rho) + w c_long(a rho),  g = (1 - w) g_long(rho) + w a^2 g_long(a rho)
+Its scales (d + 2,) are the inverse length-scales followed by a and w; those of the others are the former (d,) alone.
 """
 
 from math import sqrt
@@ -32,16 +37,21 @@ from surehold.store.kernels import njit
 
 __all__ = [
     "KERNELS",
+    "TWO_SCALES",
     "along",
     "correlation_and_factor",
     "cross_correlation",
     "kernel_number",
     "self_correlation",
+    "shape_size",
     "transposed",
+    "two_scale_slopes",
 ]
 
-KERNELS: Final = ("matern52", "matern32", "squared_exponential", "matern52_product")
+KERNELS: Final = ("matern52", "matern32", "squared_exponential", "matern52_product", "matern52_two_scales")
 _PRODUCT: Final = 3
+TWO_SCALES: Final = 4
+_NO_SHARE: Final = 1e-20  # a share that adds nothing in double precision
 _SQRT3: Final = sqrt(3.0)
 _SQRT5: Final = sqrt(5.0)
 _FAR: Final = 700.0  # beyond this exponent a correlation is 0 in double precision
@@ -54,10 +64,23 @@ def kernel_number(name: str) -> int:
     return KERNELS.index(name)
 
 
+def shape_size(kernel: int) -> int:
+    """Return how many hyperparameters the kernel has besides length-scales: 2 for two scales, else none."""
+    return 2 if kernel == TWO_SCALES else 0
+
+
 @njit(cache=True, fastmath={"contract"})
-def _transform(kernel, squared):
+def _transform(kernel, squared, scales):
     """Overwrite squared scaled distances (n,) with correlations c."""
-    if kernel == 0:
+    if kernel == TWO_SCALES and scales[-1] >= _NO_SHARE:
+        a, w = scales[-2], scales[-1]
+        for i in range(squared.size):
+            rho = _SQRT5 * sqrt(squared[i])
+            r = min(rho, _FAR)
+            s = min(a * rho, _FAR)
+            squared[i] = (1.0 - w) * ((1.0 + r + r * r / 3.0) * exponential(-r))
+            squared[i] += w * ((1.0 + s + s * s / 3.0) * exponential(-s))
+    elif kernel == 0 or kernel == TWO_SCALES:
         for i in range(squared.size):
             r = min(_SQRT5 * sqrt(squared[i]), _FAR)
             squared[i] = (1.0 + r + r * r / 3.0) * exponential(-r)
@@ -71,9 +94,18 @@ def _transform(kernel, squared):
 
 
 @njit(cache=True, fastmath={"contract"})
-def _transform_with_factor(kernel, squared, factor):
+def _transform_with_factor(kernel, squared, factor, scales):
     """Overwrite squared scaled distances (n,) with correlations c and fill `factor` (n,) with radial factors g."""
-    if kernel == 0:
+    if kernel == TWO_SCALES and scales[-1] >= _NO_SHARE:
+        a, w = scales[-2], scales[-1]
+        for i in range(squared.size):
+            rho = _SQRT5 * sqrt(squared[i])
+            r = min(rho, _FAR)
+            s = min(a * rho, _FAR)
+            e, f = (1.0 - w) * exponential(-r), w * exponential(-s)
+            squared[i] = (1.0 + r + r * r / 3.0) * e + (1.0 + s + s * s / 3.0) * f
+            factor[i] = 5.0 / 3.0 * ((1.0 + r) * e + a * a * (1.0 + s) * f)
+    elif kernel == 0 or kernel == TWO_SCALES:
         for i in range(squared.size):
             r = min(_SQRT5 * sqrt(squared[i]), _FAR)
             e = exponential(-r)
@@ -143,7 +175,7 @@ def self_correlation(kernel, X, inverse_l, out):
             _products(X[i], Z, inverse_l, row)
         else:
             _squared_distances(X[i], Z, inverse_l, row)
-            _transform(kernel, row)
+            _transform(kernel, row, inverse_l)
         out[i, i] = 1.0
 
 
@@ -156,7 +188,7 @@ def cross_correlation(kernel, X, Q, inverse_l, out):
             _products(X[i], Z, inverse_l, out[i])
         else:
             _squared_distances(X[i], Z, inverse_l, out[i])
-            _transform(kernel, out[i])
+            _transform(kernel, out[i], inverse_l)
 
 
 @njit(cache=True)
@@ -170,17 +202,27 @@ def correlation_and_factor(kernel, X, Q, inverse_l, out, factor):
                 factor[i, j] = out[i, j]
         else:
             _squared_distances(X[i], Z, inverse_l, out[i])
-            _transform_with_factor(kernel, out[i], factor[i])
+            _transform_with_factor(kernel, out[i], factor[i], inverse_l)
 
 
-def correlation(kernel: str, X: np.ndarray, Q: np.ndarray, length_scales: np.ndarray) -> np.ndarray:
-    """Return c(X, Q) of shape (n, q) for X (n, d), Q (q, d) and length-scales (d,)."""
+@njit(cache=True)
+def two_scale_slopes(squared, a, w):
+    """Return the derivatives of the correlation of two scales by log a and by log(w / (1 - w)), at rho^2 = squared."""
+    rho = _SQRT5 * sqrt(squared)
+    r, s = min(rho, _FAR), min(a * rho, _FAR)
+    short = (1.0 + s + s * s / 3.0) * exponential(-s)
+    long = (1.0 + r + r * r / 3.0) * exponential(-r)
+    return -w * s * s / 3.0 * (1.0 + s) * exponential(-s), w * (1.0 - w) * (short - long)
+
+
+def correlation(kernel: str, X: np.ndarray, Q: np.ndarray, length_scales: np.ndarray, *shape: float) -> np.ndarray:
+    """Return c(X, Q) of shape (n, q) for X (n, d), Q (q, d), length-scales (d,) and, of two scales, a and w."""
     out = np.empty((len(X), len(Q)))
     cross_correlation(
         kernel_number(kernel),
         np.ascontiguousarray(X, dtype=np.float64),
         np.ascontiguousarray(Q, dtype=np.float64),
-        1.0 / np.asarray(length_scales, dtype=np.float64).ravel(),
+        np.append(1.0 / np.asarray(length_scales, dtype=np.float64).ravel(), shape),
         out,
     )
     return out

@@ -2,8 +2,11 @@
 
 Legend (the thesis' symbols in brackets)
     X, y     inputs (n, d) in the unit cube, outputs (n,)
-    theta    hyperparameters (p,): log l_1 .. log l_d, then log s2 if learnt, then log v if learnt
+    theta    hyperparameters (p,): log l_1 .. log l_d, then those of the kernel's shape, if it has any, then log s2 if
+             learnt, then log v if learnt
     l        length-scales (d,)
+    a, w     shape of the kernel of two scales: proportion of its length-scales, share of the short one; in theta
+             log a, log(w / (1 - w))
     s2       signal variance                                        [sigma_p, used as a variance]
     v        observation-noise variance, common to all observations
     noise    known observation-noise variance of each observation (n,)
@@ -25,7 +28,13 @@ from numba import types
 from numpy.typing import NDArray
 
 from surehold.optimization.numerics.cholesky import cholesky, invert_lower, solve_lower
-from surehold.optimization.surrogates.gaussian_process.kernels import along, correlation_and_factor, self_correlation
+from surehold.optimization.surrogates.gaussian_process.kernels import (
+    TWO_SCALES,
+    along,
+    correlation_and_factor,
+    self_correlation,
+    two_scale_slopes,
+)
 from surehold.store.kernels import njit
 
 __all__ = ["EVIDENCE_TYPE", "Evidence", "log_posterior", "log_posterior_and_gradient"]
@@ -99,13 +108,25 @@ def unpack(theta, evidence):
     """Return (s2, v) of theta."""
     d = evidence.X.shape[1]
     s2, v = evidence.signal_variance, 0.0
-    position = d
+    position = d + (2 if evidence.kernel == TWO_SCALES else 0)
     if evidence.learn_signal:
         s2 = exp(theta[position])
         position += 1
     if evidence.learn_noise:
         v = exp(theta[position])
     return s2, v
+
+
+@njit(cache=True)
+def scales_of(theta, evidence):
+    """Return the kernel's scales: inverse length-scales (d,), and those of its shape, if it has any."""
+    d = evidence.X.shape[1]
+    if evidence.kernel != TWO_SCALES:
+        return np.exp(-theta[:d])
+    scales = np.exp(-theta[: d + 2])
+    scales[d] = exp(theta[d])
+    scales[d + 1] = 1.0 / (1.0 + exp(-theta[d + 1]))
+    return scales
 
 
 @njit(cache=True)
@@ -136,8 +157,7 @@ def log_posterior(theta, evidence):
     value = _log_prior(theta, evidence)
     if value == -inf:
         return value
-    d = evidence.X.shape[1]
-    inverse_l = np.exp(-theta[:d])
+    inverse_l = scales_of(theta, evidence)
     s2, v = unpack(theta, evidence)
     for b in range(evidence.weights.size):
         start, stop = evidence.offsets[b], evidence.offsets[b + 1]
@@ -169,7 +189,7 @@ def log_posterior(theta, evidence):
 
 @njit(cache=True)
 def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, gradient):
-    """Return log p of one block and add its derivatives to `gradient` (d + 2,): log l, log s2, log v."""
+    """Return log p of one block and add its derivatives to `gradient` (d + 4,): log l, log s2, log v, shape."""
     n, d = X.shape
     C = np.empty((n, n))
     factor = np.empty((n, n))
@@ -196,6 +216,14 @@ def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel,
                 t = step * inverse_l[k]
                 gradient[k] += w * factor[i, j] * along(kernel, step, inverse_l[k]) * t * t
             gradient[d] += w * C[i, j]
+            if kernel == TWO_SCALES:
+                squared = 0.0
+                for k in range(d):
+                    t = (X[i, k] - X[j, k]) * inverse_l[k]
+                    squared += t * t
+                by_proportion, by_share = two_scale_slopes(squared, inverse_l[d], inverse_l[d + 1])
+                gradient[d + 2] += w * by_proportion
+                gradient[d + 3] += w * by_share
         w = 0.5 * (alpha[i] * alpha[i] - A_inverse[i, i])
         gradient[d] += w * s2 * (1.0 + ratio)
         gradient[d + 1] += w * v
@@ -210,15 +238,15 @@ def log_posterior_and_gradient(theta, evidence):
     if value == -inf:
         return value, gradient
     d = evidence.X.shape[1]
-    inverse_l = np.exp(-theta[:d])
+    inverse_l = scales_of(theta, evidence)
     s2, v = unpack(theta, evidence)
-    full = np.zeros(d + 2)
+    full = np.zeros(d + 4)
     for b in range(evidence.weights.size):
         start, stop = evidence.offsets[b], evidence.offsets[b + 1]
         weight = evidence.weights[b]
         if stop == start or weight == 0.0:
             continue
-        part = np.zeros(d + 2)
+        part = np.zeros(d + 4)
         block = _block_gradient(
             evidence.X[start:stop],
             evidence.y[start:stop],
@@ -234,11 +262,14 @@ def log_posterior_and_gradient(theta, evidence):
         if block == -inf:
             return -inf, gradient
         value += weight * block
-        for i in range(d + 2):
+        for i in range(d + 4):
             full[i] += weight * part[i]
     for i in range(d):
         gradient[i] = full[i]
     position = d
+    if evidence.kernel == TWO_SCALES:
+        gradient[d], gradient[d + 1] = full[d + 2], full[d + 3]
+        position += 2
     if evidence.learn_signal:
         gradient[position] = full[d]
         position += 1

@@ -45,7 +45,8 @@ class GaussianProcess:
     ----------
     kernel
         "matern52" (default), "matern32", "squared_exponential", or "matern52_product", the product of Matern-5/2
-        correlations of single variables; one length-scale a dimension.
+        correlations of single variables; one length-scale a dimension. "matern52_two_scales" is the sum of a long and
+        a short process: how much of the variance is the short one's, and whether there is one at all, is learnt.
     signal_variance
         Fixed signal variance; None (default) learns it. In squared standard deviations of the outputs, or in squared
         units of the outputs where `standardize` is False.
@@ -264,7 +265,7 @@ class GaussianProcess:
         known = noise if noise is not None else np.full(len(y), 0.0 if isinstance(self._noise, str) else self._noise)
         learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred" and noise is None
         prior = self._prior or Prior((log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION))
-        prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise)
+        prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise, self._kernel)
         return Evidence(
             np.ascontiguousarray(X, dtype=np.float64),
             np.ascontiguousarray(outputs.apply(y)),

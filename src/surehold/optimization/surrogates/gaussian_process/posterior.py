@@ -8,9 +8,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import expit, ndtri
 
 from surehold.errors import SureholdError
+from surehold.optimization.surrogates.gaussian_process.kernels import shape_size
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.prediction import average, factorize, sample
@@ -25,7 +26,7 @@ class Hyperparameters(NamedTuple):
     theta: NDArray[np.float64]
     """(m, p)"""
     inverse_l: NDArray[np.float64]
-    """inverse length-scales, (m, d)"""
+    """the kernel's scales: inverse length-scales (m, d), and those of its shape, if it has any"""
     s2: NDArray[np.float64]
     """signal variances in standardized units, (m,)"""
     v: NDArray[np.float64]
@@ -61,15 +62,16 @@ class GaussianProcessPosterior:
         log_noise: "GaussianProcessPosterior | None" = None,
         factors: Factors | None = None,
     ):
-        m, d = len(theta), evidence.X.shape[1]
-        n = len(evidence.X)
+        m, (n, d) = len(theta), evidence.X.shape
         self.evidence: Final = evidence
         self.outputs: Final = outputs
         self.log_noise: Final = log_noise
         self.hyperparameters: Final = Hyperparameters(
             theta,
-            np.exp(-theta[:, :d]),
-            np.exp(theta[:, d]) if evidence.learn_signal else np.full(m, evidence.signal_variance),
+            _scales(theta, d, evidence.kernel),
+            np.exp(theta[:, d + shape_size(evidence.kernel)])
+            if evidence.learn_signal
+            else np.full(m, evidence.signal_variance),
             np.exp(theta[:, -1]) if evidence.learn_noise else np.zeros(m),
         )
         self._Y: Final = np.ascontiguousarray(np.broadcast_to(evidence.y, (m, n)) if Y is None else Y)
@@ -102,10 +104,15 @@ class GaussianProcessPosterior:
         """Return how much the trials after the first k contradict the particles, in standard deviations."""
         return surprise(self.factors.inverse_L, self._Y, k)
 
+    def left_out(self) -> Moments:
+        """Return means and variances (m, n) of each trial's value given all others, observation noise included."""
+        mean, variance = left_out(self.factors.inverse_L, self.factors.alpha, self._Y)
+        return Moments(self.outputs.shift + self.outputs.scale * mean, self.outputs.square * variance, None, None)
+
     @property
     def length_scales(self) -> NDArray[np.float64]:
         """Length-scales of the particles, (m, d), in widths of the unit cube."""
-        return 1.0 / self.hyperparameters.inverse_l
+        return 1.0 / self.hyperparameters.inverse_l[:, : self.evidence.X.shape[1]]
 
     def average(
         self,
@@ -213,6 +220,25 @@ class GaussianProcessPosterior:
         if self.log_noise is not None:
             return np.exp(self.log_noise.moments(X).mean[0])
         return np.full(len(X), self.evidence.noise.mean())
+
+
+def _scales(theta: NDArray[np.float64], d: int, kernel: int) -> NDArray[np.float64]:
+    """Return the kernel's scales of particles theta (m, p); as `likelihood.scales_of`, for all of them."""
+    inverse_l = np.exp(-theta[:, :d])
+    if not shape_size(kernel):
+        return inverse_l
+    return np.column_stack([inverse_l, np.exp(theta[:, d]), expit(theta[:, d + 1])])
+
+
+def left_out(
+    inverse_L: NDArray[np.float64], alpha: NDArray[np.float64], Y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return means and variances (m, n) of each output given all others (Rasmussen and Williams 2006, (5.12)).
+
+    inverse_L (m, n, n) are the inverse factors of the data's covariances A, alpha (m, n) is A^-1 y, Y (m, n) hold y.
+    """
+    precision = np.einsum("mij,mij->mj", inverse_L, inverse_L)  # diagonal of A^-1
+    return Y - alpha / precision, 1.0 / precision
 
 
 def surprise(inverse_L: NDArray[np.float64], Y: NDArray[np.float64], k: int) -> float:

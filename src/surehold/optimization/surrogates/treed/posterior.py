@@ -99,6 +99,18 @@ class TreedPosterior:
             leaves[leaf] = leaves[leaf].with_pending(X[home == leaf])
         return TreedPosterior(self.partition, tuple(leaves), self.diagnostics.observations)
 
+    def left_out(self) -> Moments:
+        """Return means and variances (m, n) of each trial's value given all others in its leaf.
+
+        The tree stays as it is. A trial on a border is left out of the first leaf that has it.
+        """
+        m, n = len(self.leaves[0].hyperparameters.theta), self.diagnostics.observations
+        mean, variance = np.empty((m, n)), np.empty((m, n))
+        for leaf, node in reversed(list(zip(self.leaves, self.partition.leaves, strict=True))):
+            part, own = leaf.left_out(), self.partition.nodes[node].members
+            mean[:, own], variance[:, own] = part.mean, part.variance
+        return Moments(mean, variance, None, None)
+
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance of the observation noise (m, q) at X (q, d), known or learnt, in squared outputs."""
         home = self.partition.route(X)
@@ -165,6 +177,13 @@ class AveragedTrees:
     def with_pending(self, X: NDArray[np.float64]) -> "AveragedTrees":
         """Return the posterior as if each particle's own mean had been observed at X (k, d)."""
         return AveragedTrees(tuple(tree.with_pending(X) for tree in self.trees))
+
+    def left_out(self) -> Moments:
+        """Return means and variances (m, n) of each trial's value given all others in its leaf."""
+        parts = [tree.left_out() for tree in self.trees]
+        return Moments(
+            np.concatenate([part.mean for part in parts]), np.concatenate([part.variance for part in parts]), None, None
+        )
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance of the observation noise (m, q) at X (q, d), known or learnt, in squared outputs."""

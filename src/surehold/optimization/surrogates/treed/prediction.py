@@ -26,7 +26,7 @@ class LeafTable(NamedTuple):
     X: NDArray[np.float64]
     """trials of the leaves, (N, d)"""
     inverse_l: NDArray[np.float64]
-    """(l, m, d)"""
+    """(l, m, d), and what else the kernel's scales hold"""
     s2: NDArray[np.float64]
     """(l, m)"""
     factors: NDArray[np.float64]
@@ -117,7 +117,8 @@ def average_in_leaves(Q, offsets, slopes, weights, home, table, gradient):
     `LeafTable`.
     """
     first, X, inverse_l, s2, factors, alpha, outputs, mean_variance, kernel = table
-    leaves, m, d = inverse_l.shape
+    leaves, m, _ = inverse_l.shape
+    d = X.shape[1]
     total = len(Q)
     mean, variance = np.zeros((m, total)), np.zeros((m, total))
     by_mean, by_variance = np.zeros((m, total, d)), np.zeros((m, total, d))

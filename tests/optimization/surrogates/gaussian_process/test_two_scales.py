@@ -1,0 +1,108 @@
+"""Learning whether a response has one scale or two."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import multivariate_normal, norm
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+
+from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, log_evidence_and_root, mode
+from surehold.optimization.surrogates.gaussian_process.kernels import correlation, kernel_number
+from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.protocol import mixture
+
+
+def smooth(X):
+    return np.sin(5.0 * X[:, 0]) + X[:, 1] ** 2
+
+
+def rough(X):
+    """A hill, and roughness much finer than the spacing of trials."""
+    return smooth(X) + 0.5 * np.sign(np.sin(300.0 * X[:, 0]) * np.sin(170.0 * X[:, 1]))
+
+
+def trials(f, n=60, seed=0):
+    X = np.random.default_rng(seed).random((n, 2))
+    return X, f(X)
+
+
+def shares_of(f):
+    """Return the share w of the short part in each particle, 0 where there is none."""
+    posterior = GaussianProcess(kernel="matern52_two_scales", mean_variance=1.0).fit(*trials(f)).posterior
+    return posterior.hyperparameters.inverse_l[:, -1]
+
+
+def test_a_smooth_function_has_one_scale():
+    assert shares_of(smooth).max() < 1e-20
+
+
+def test_a_rough_function_has_two():
+    assert shares_of(rough).min() > 0.05
+
+
+def test_rough_between_trials_it_predicts_the_trend_and_knows_what_it_does_not_know():
+    """One stationary process calls the trend noise-free and short; at fresh inputs it errs more."""
+    X, y = trials(rough)
+    Q, truth = trials(rough, n=2000, seed=1)
+    errors = {}
+    for kernel, constant in (("matern52", 0.0), ("matern52_two_scales", 1.0)):
+        mean, std = GaussianProcess(kernel=kernel, mean_variance=constant).fit(X, y).predict(Q, return_std=True)
+        errors[kernel] = np.sqrt(np.mean((mean - truth) ** 2))
+    assert errors["matern52_two_scales"] < 0.9 * errors["matern52"]
+    assert 0.9 < np.mean(np.abs(mean - truth) < 1.96 * std) < 0.999
+
+
+def test_particles_predict_as_scikit_learn():
+    X, y = trials(rough, 30)
+    Q, _ = trials(rough, 7, 1)
+    posterior = GaussianProcess(kernel="matern52_two_scales", ratio=1e-8).fit(X, y).posterior
+    found, p = posterior.moments(Q), posterior.hyperparameters
+    for j, scales in enumerate(posterior.length_scales):
+        a, w = p.inverse_l[j, 2:]
+        kernel = ConstantKernel(p.s2[j] * (1.0 - w)) * Matern(scales, nu=2.5)
+        kernel += ConstantKernel(p.s2[j] * w) * Matern(scales / a, nu=2.5)
+        reference = GaussianProcessRegressor(kernel, alpha=1e-8 * p.s2[j], optimizer=None, normalize_y=True).fit(X, y)
+        mean, std = reference.predict(Q, return_std=True)
+        np.testing.assert_allclose(found.mean[j], mean, atol=1e-5)
+        np.testing.assert_allclose(np.sqrt(found.variance[j]), std, atol=1e-4)
+
+
+def test_evidence_is_the_integral_over_the_hyperparameter():
+    """Laplace's method beside quadrature, in one hyperparameter."""
+    rng = np.random.default_rng(3)
+    X = np.sort(rng.random((40, 1)), axis=0)
+    y = np.sin(12.0 * X[:, 0]) + 0.1 * rng.standard_normal(40)
+    evidence = Evidence(
+        X=X, y=y, noise=np.full(40, 0.01), offsets=np.array([0, 40]), weights=np.ones(1), prior_mean=np.array([-1.5]),
+        prior_deviation=np.ones(1), signal_variance=1.0, ratio=0.0, mean_variance=0.0,
+        kernel=kernel_number("matern52"), learn_signal=False, learn_noise=False,
+    )  # fmt: skip
+    center, _ = mode(evidence)
+    found, root = log_evidence_and_root(evidence, center)
+
+    def density(t, shift):
+        A = correlation("matern52", X, X, np.exp([t])) + 0.01 * np.eye(40)
+        return np.exp(multivariate_normal.logpdf(y, np.zeros(40), A) + norm.logpdf(t, -1.5, 1.0) - shift)
+
+    integral = quad(density, center[0] - 2.0, center[0] + 2.0, args=(found,), points=[center[0]])[0]
+    assert np.log(integral) == pytest.approx(0.0, abs=0.1)
+    assert 0.0 < root[0, 0] < 1.0
+
+
+@pytest.mark.parametrize("method", ["map", "elliptical_slice"])
+def test_every_way_to_learn(method):
+    X, y = trials(rough, 40)
+    learning = Learning(method=method, particles=6)
+    process = GaussianProcess(kernel="matern52_two_scales", learning=learning).fit(X, y)
+    assert len(process.posterior.length_scales) == (1 if method == "map" else 6)
+    mean, variance = mixture(process.posterior.moments(X))
+    np.testing.assert_allclose(mean, y, atol=1e-3)
+    assert variance.max() < 1e-3
+
+
+def test_the_same_trials_give_the_same_particles():
+    X, y = trials(rough, 50)
+    first, second = (GaussianProcess(kernel="matern52_two_scales").fit(X, y, seed=4).posterior for _ in range(2))
+    np.testing.assert_array_equal(first.hyperparameters.theta, second.hyperparameters.theta)
