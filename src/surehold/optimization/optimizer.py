@@ -270,6 +270,16 @@ class Optimizer:
         return self.box.from_unit(self._trials.pending)
 
     @property
+    def outputs(self) -> dict[str, NDArray[np.float64]]:
+        """Further outputs told so far by name, (t,) each; NaN where one was not measured."""
+        return {limit.name: self._trials.outputs[:, k] for k, limit in enumerate(self._trials.limits)}
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Whether each trial may become the answer, (t,): it gave a value and satisfies all that is required."""
+        return self._trials.successful if self._requirements is None else self._requirements.feasible(self._trials)
+
+    @property
     def reached(self) -> NDArray[np.float64]:
         """Inputs truly reached (t, d), in the box's units: the commanded ones where nothing else was told."""
         return self.box.from_unit(self._trials.reached)

@@ -81,12 +81,14 @@ class Requirements:
         self._lattice: Final = lattice
         self._seed: Final = seed
         self._limited: Final = tuple(k for k, limit in enumerate(limits) if not limit.watched)
+        self._cautious: Final[dict[int, tuple[int, Posterior]]] = {}
         self._models: Final = {k: self._model(GaussianProcess(noise=noise), k) for k in range(len(limits))}
 
     def forget(self) -> None:
         """Drop what was learnt: the trials are others from now on."""
         for model in self._models.values():
             model.forget()
+        self._cautious.clear()
 
     # --- which trials are feasible --------------------------------------------------------------------------------
 
@@ -262,10 +264,15 @@ class Requirements:
             return self._models[k].posterior(told)
         # Trials that all keep well within the limit show little of what the output may do elsewhere: until they show
         # more, it may differ by as much as the limit is away.
+        known = self._cautious.get(k)
+        if known is not None and known[0] == len(told):
+            return known[1]
         limit, y = self.limits[k], told.values
         away = min(abs(end - float(y.mean())) for end in (limit.lower, limit.upper) if np.isfinite(end))
         wide = (float(y.mean()) - 2.0 * away, float(y.mean()) + 2.0 * away) if away > 0.0 else None
-        return self._model(GaussianProcess(noise=self._noise, output_range=wide), k).posterior(told)
+        posterior = self._model(GaussianProcess(noise=self._noise, output_range=wide), k).posterior(told)
+        self._cautious[k] = (len(told), posterior)
+        return posterior
 
     def _model(self, surrogate: GaussianProcess, k: int) -> ResponseModel:
         return ResponseModel(

@@ -4,7 +4,7 @@ Written as the study's attribute `surehold:recommendation` and as its note, whic
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -45,6 +45,12 @@ class StudyRecommendation:
     """trials with a value that the recommendation rests on"""
     refused: str
     """why the best observed trial is not recommended; empty where it is"""
+    feasible: float = 1.0
+    """probability that one execution keeps all limits of the further outputs"""
+    infeasible: str = ""
+    """why nothing feasible is known; empty where something is"""
+    outputs: dict[str, float] = field(default_factory=dict)
+    """what is expected of the further outputs, by name"""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -87,7 +93,7 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     sign = 1.0 if maximize else -1.0
     trials = study.get_trials(deepcopy=False)
     space = sampler.search_space(study)
-    history = history_of(trials, space, maximize)
+    history = history_of(trials, space, maximize, outputs=sampler.outputs)
     with sampler.optimizing(space, history) as optimizer:
         best = optimizer.recommend()
         told = np.flatnonzero(np.isfinite(history.y))
@@ -110,6 +116,9 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         sign * float(np.nanmax(history.y)),
         best.n,
         text if number != highest else "",
+        best.feasible,
+        best.infeasible,
+        {name: outcome.mean for name, outcome in best.outputs.items()},
     )
 
 
@@ -125,6 +134,11 @@ def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> 
         f"Expect {found.mean:.4g} ± {found.std:.2g} when the input is off; 95 % of executions are better than "
         f"{found.quantile:.4g}. It gave {found.observed:.4g} when it was tried. {found.n} trials with a value.",
     ]
+    if found.outputs:
+        expected = ", ".join(f"{name} {_shown(value)}" for name, value in found.outputs.items())
+        lines += ["", f"Expected besides: {expected}; {found.feasible:.1%} of executions keep all limits."]
+    if found.infeasible:
+        lines += ["", found.infeasible[:1].upper() + found.infeasible[1:]]
     if found.refused:
         lines += ["", f"Not trial {found.highest_trial}, the best observed one. {found.refused}"]
     return "\n".join([*lines, "", _END])
