@@ -87,6 +87,8 @@ JOINT_POINTS: Final = 512
 
 #: Quasi-random points, as a power of two, by which outcomes are averaged. python -m benchmarks.quadrature_error
 QUASI_RANDOM_EXPONENT: Final = 5
+#: Representative conditions, of uncontrolled variables, by which candidates are screened. Never measured.
+COARSE_CONDITIONS: Final = 8
 #: The same for the description of the recommended input: quantiles need more points than means. Never measured.
 OUTCOME_EXPONENT: Final = 7
 
@@ -219,17 +221,17 @@ THESIS_REPEATS: Final = 2
 
 # --- constraints ------------------------------------------------------------------------------------------------------
 
-#: Points of a Sobol sequence that are tested for the first allowed inputs: at most so many where all constraints are
-#: linear, and where a user's function has to be called for each; and allowed ones after which the search ends. A region
-#: of one part in 100,000 of the box, or in 16,000, is found by chance in two of three cases. Never measured.
+#: Points of a Sobol sequence tested for the first allowed inputs: at most so many where all constraints are linear, and
+#: where a user's function has to be called for each; and allowed ones after which the search ends. A region of one part
+#: in 100,000 of the box, or in 16,000, is found by chance in two of three cases. Never measured.
 REGION_SEARCH: Final = 2**17
 REGION_SEARCH_CALLS: Final = 2**14
 REGION_KNOWN: Final = 256
-#: While nothing feasible is known, trials at once keep so many box widths apart: the standard deviation of the hole that
-#: a trial under way tears into the probability of being feasible. Never measured.
+#: While nothing feasible is known, trials at once keep so many box widths apart: the standard deviation of the hole
+#: that a trial under way tears into the probability of being feasible. Never measured.
 APART: Final = 0.1
-#: Probability with which an answer has to keep the limits of further outputs, where `Optimizer(feasible=)` says nothing.
-#: Customary. Never measured.
+#: Probability with which an answer has to keep the limits of further outputs, where `Optimizer(feasible=)` says
+#: nothing. Customary. Never measured.
 FEASIBLE: Final = 0.95
 #: Random allowed points among which an initial design replaces those of its points that are not. Never measured.
 REGION_POOL: Final = 256

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError
 from surehold.optimization.points import points_of
+from surehold.optimization.uncontrolled import Conditions, bounds_of, conditions_of
 
 __all__ = ["Box"]
 
@@ -19,11 +20,17 @@ class Box:
     ----------
     bounds
         `{name: (lower, upper)}` with finite `lower < upper`, in the user's units.
+    uncontrolled
+        Variables that are drawn or measured when the answer is used, not set: {name: samples (N,)}, {name: a
+        distribution of scipy.stats}, or {(name, name): samples (N, 2)} of such that depend on each other. Those that
+        have no bounds get the range of their samples (of a distribution, of all but one in a thousand at either end)
+        and stand behind the others.
 
     Attributes
     ----------
     names : tuple of str, length d
     lower, upper : (d,) float64, read-only, the user's units
+    uncontrolled : Conditions, None where all variables are set
 
     Raises
     ------
@@ -37,7 +44,9 @@ class Box:
     array([0.5, 1. ])
     """
 
-    def __init__(self, bounds: Mapping[str, tuple[float, float]]):
+    def __init__(self, bounds: Mapping[str, tuple[float, float]], *, uncontrolled: Mapping[Any, Any] | None = None):
+        if uncontrolled is not None and isinstance(bounds, Mapping):
+            bounds = bounds_of(bounds, uncontrolled)
         if not isinstance(bounds, Mapping) or len(bounds) == 0:
             raise InputError(
                 f"bounds are {bounds!r}; give a mapping such as {{'dx': (-0.05, 0.05)}} of one or more names."
@@ -60,6 +69,7 @@ class Box:
         self.names: Final[tuple[str, ...]] = tuple(bounds)
         self.lower: Final[NDArray[np.float64]] = np.array([pair[0] for pair in pairs])
         self.upper: Final[NDArray[np.float64]] = np.array([pair[1] for pair in pairs])
+        self.uncontrolled: Final[Conditions | None] = conditions_of(self.names, self.lower, self.upper, uncontrolled)
         self.lower.flags.writeable = False
         self.upper.flags.writeable = False
 
@@ -119,6 +129,7 @@ class Box:
             and self.names == other.names
             and np.array_equal(self.lower, other.lower)
             and np.array_equal(self.upper, other.upper)
+            and _same(self.uncontrolled, other.uncontrolled)
         )
 
     def __hash__(self) -> int:
@@ -129,3 +140,9 @@ class Box:
             f"{n!r}: ({lo:g}, {up:g})" for n, lo, up in zip(self.names, self.lower, self.upper, strict=True)
         )
         return f"Box({{{inner}}})"
+
+
+def _same(mine: Conditions | None, other: Conditions | None) -> bool:
+    if mine is None or other is None:
+        return mine is other
+    return np.array_equal(mine.held, other.held) and np.array_equal(mine.samples, other.samples)

@@ -129,6 +129,11 @@ class Optimizer:
         Probability with which every trial after the `initial_points`, which must be given and are trusted, has to keep
         all limits. By default None: trials may break them. What that guarantees, and what not, is said in
         `requirements.Requirements.admission`.
+    conditions
+        Of a box with uncontrolled variables, while exploring: "commanded" (default), as in a simulator: every trial
+        says at which condition it is to be made. "measured", as on a robot: trials are made at whatever comes, and each
+        tells it (`tell(x, y, reached={"payload": 1.3})`); what `ask` says of these variables is their mean. The answer
+        is good on average over them, or by `risk`, and holds their mean, which nobody sets.
 
     Raises
     ------
@@ -164,6 +169,7 @@ class Optimizer:
         constraints: Mapping[str, Any] | None = None,
         feasible: float = FEASIBLE,
         safety: float | None = None,
+        conditions: Literal["commanded", "measured"] = "commanded",
     ):
         given = {name: value for name, value in locals().items() if name not in ("self", "box")}
         if not isinstance(box, Box):
@@ -223,6 +229,9 @@ class Optimizer:
             continues_chains=self._strategy.continues_chains,
             seed=self.seed,
         )
+        if conditions not in ("commanded", "measured"):
+            raise unknown_name("conditions", conditions, ("commanded", "measured"))
+        self._measured: Final = box.uncontrolled is not None and conditions == "measured"
         limits = limits_of(constraints)
         self._requirements = required(
             box,
@@ -323,7 +332,21 @@ class Optimizer:
             `AskedTrial` has been told before; if y is missing, not finite or not a number; if a failed trial comes with
             a value; if an output is missing, unknown or not finite. Nothing told before is lost.
         """
+        if self._measured:
+            reached = self._with_conditions(x, reached)
         self._trials.tell(x, None if y is None else self._sign * number_of(y), failed, reached, constraints)
+
+    def _with_conditions(self, x: Any, reached: Any) -> Any:
+        """Return the reached input, of which only the uncontrolled variables must be said."""
+        held = self.box.uncontrolled
+        names = [] if held is None else [n for n, h in zip(self.box.names, held.held, strict=True) if h]
+        if reached is None or (isinstance(reached, Mapping) and not set(names) <= set(reached)):
+            raise InputError(
+                f"the trial says nothing about {', '.join(names)}, which nobody sets; tell "
+                f"reached={{{', '.join(f'{name!r}: value' for name in names)}}}."
+            )
+        commanded = self.box.as_dict(x.x if isinstance(x, AskedTrial) else x)
+        return {**commanded, **reached} if isinstance(reached, Mapping) else reached
 
     def forget(self, x: Any) -> None:
         """Drop a pending trial, an `AskedTrial` or its x (d,), that will never be told; its number is asked for again.
@@ -454,6 +477,8 @@ class Optimizer:
             with single_threaded():
                 u = self._propose(self._rng(2, position))
         u = self._snapped(u)
+        if self.box.uncontrolled is not None and self._measured:
+            u = self.box.uncontrolled.at_mean(u)
         return AskedTrial(self._trials.ask(position, u), self.box.from_unit(u))
 
     def _unused_place(self, position: int) -> int:
@@ -523,6 +548,8 @@ class Optimizer:
                 rng = self._rng(3, len(self._trials))
                 strict = None if self._requirements is None else self._requirements.strict(self._trials)
                 u, observed = self._snapped(ranking.best(posterior, history.tried, rng, strict)), np.nan
+            if self.box.uncontrolled is not None:
+                u = self.box.uncontrolled.at_mean(u)
             reached = Perturbations.of(
                 self.input_noise, self.box, "quasi_monte_carlo", ranking.accurate.border, exponent=OUTCOME_EXPONENT
             )

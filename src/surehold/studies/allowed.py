@@ -1,5 +1,6 @@
 """Input constraints of a study: said in its parameters, kept in the coordinates of its box."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,8 @@ def allowed_in(space: SearchSpace, allowed: Any) -> list[Rule] | None:
 
 def _translated(space: SearchSpace, rule: Rule) -> Rule:
     if not isinstance(rule, Linear):
-        return lambda x: rule(space.decode(x))
+        function: Callable[[Any], Any] = rule
+        return lambda x: function(space.decode(x))
     names = tuple(space.distributions)
     weights = rule.row(names)
     for name in rule.weights:

@@ -59,7 +59,8 @@ class Sampler(BaseSampler):
     **settings
         Of `Optimizer`: criterion, n_initial, design, noise, output_range, quadrature, k, border, kappa, risk, preset,
         allowed, constraints, feasible. A function `allowed` takes the parameters {name: value}. The further outputs of
-        a trial are its attributes of that name: `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets start anew for every suggestion.
+        a trial are its attributes of that name: `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets
+        start anew for every suggestion.
 
     The direction of the study decides whether values are maximized or minimized; several objectives are refused.
 

@@ -13,14 +13,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import QUASI_RANDOM_EXPONENT
+from surehold.defaults import COARSE_CONDITIONS, QUASI_RANDOM_EXPONENT
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.kinds import Root
 from surehold.optimization.noise.quadratures import QUADRATURES, Quadrature, exact, quadrature
+from surehold.optimization.noise.samples import representatives
 from surehold.optimization.surrogates.gaussian_process.closed_form import closed_form
 from surehold.optimization.surrogates.protocol import Moments, Posterior
+from surehold.optimization.uncontrolled import Conditions
 
 __all__ = ["BORDERS", "Perturbations"]
 
@@ -42,6 +44,8 @@ class Perturbations:
     """for noise that varies: points (q, d) -> roots of the covariances there, (q, d, d)"""
     covariance: NDArray[np.float64] | None = None
     """(d, d) where outcomes are computed in closed form; the quadrature then serves everything else"""
+    held: NDArray[np.bool_] | None = None
+    """uncontrolled variables (d,): their "offsets" are the values that they take, whatever the query's"""
 
     def __post_init__(self) -> None:
         if self.border not in BORDERS:
@@ -67,6 +71,15 @@ class Perturbations:
         """
         if rule not in (*QUADRATURES, "closed_form"):
             raise unknown_name("quadrature", rule, (*QUADRATURES, "closed_form"))
+        if box.uncontrolled is not None:
+            if rule == "closed_form":
+                raise InputError("the quadrature 'closed_form' knows no uncontrolled variables; choose another one.")
+            points, root = (
+                (exact(box.dimension), None) if noise is None else noise.kind.quadrature(box, rule, k, exponent)
+            )
+            return cls(
+                under_conditions(points, box.uncontrolled, rule, exponent), border, root, None, box.uncontrolled.held
+            )
         if noise is None:
             return cls(exact(box.dimension), border)
         if rule == "closed_form":
@@ -105,12 +118,37 @@ class Perturbations:
         offsets = self.quadrature.offsets
         if self.root is not None:
             offsets = np.einsum("qde,se->qsd", self.root(U), offsets)
+        free = None
+        if self.held is not None:
+            offsets = np.where(self.held, self.quadrature.offsets - U[:, None, :], offsets)
+            free = np.broadcast_to(np.where(self.held, 0.0, 1.0), offsets.shape)
         if self.border == "extend":
-            return offsets, None
+            return offsets, free
         points = U[:, None, :] + offsets
         inside = (points >= 0.0) & (points <= 1.0)
         if inside.all():
-            return offsets, None
+            return offsets, free
         if self.border == "keep":
-            return np.where(inside, offsets, 0.0), None
-        return np.clip(points, 0.0, 1.0) - U[:, None, :], inside.astype(np.float64)
+            return np.where(inside, offsets, 0.0), free
+        slopes = inside.astype(np.float64)
+        return np.clip(points, 0.0, 1.0) - U[:, None, :], slopes if free is None else slopes * free
+
+
+def under_conditions(points: Quadrature, conditions: Conditions, rule: str, exponent: int) -> Quadrature:
+    """Return a quadrature of the input noise with the values of uncontrolled variables in their columns.
+
+    Quasi-random points are paired with as many representative conditions, in a fixed random order; the few points of
+    the other rules are combined with each of 8.
+    """
+    paired = rule == "quasi_monte_carlo" and len(points.weights) > 1
+    count = 2**exponent if rule == "quasi_monte_carlo" else COARSE_CONDITIONS
+    taken = representatives(conditions.samples, count)
+    s, c = len(points.weights), len(taken.weights)
+    if paired:
+        rows = np.random.default_rng(0).permutation(np.arange(s) % c)
+        noise, weights = points.offsets.copy(), points.weights * taken.weights[rows]
+    else:
+        rows = np.tile(np.arange(c), s)
+        noise, weights = np.repeat(points.offsets, c, axis=0), np.repeat(points.weights, c) * taken.weights[rows]
+    noise[:, conditions.held] = taken.offsets[rows]
+    return Quadrature(noise, weights / weights.sum())

@@ -41,13 +41,19 @@ def strategy_named(
     InputError
         For an unknown name, a value out of range, or settings that contradict each other.
     """
+    shaken = input_noise is not None or box.uncontrolled is not None
     if criterion is None:
-        criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + (input_noise is not None)]
+        criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + shaken]
     name = criterion_name(criterion)
     if not np.isfinite(kappa):
         raise InputError(f"kappa is {kappa!r}; give a finite number of standard deviations.")
     averse = risk.name != "mean"
-    if input_noise is None and (name.scale != "exact" or averse):
+    if box.uncontrolled is not None and (thesis is not None or (name.scale == "exact" and not averse)):
+        raise InputError(
+            "some variables are uncontrolled: what counts is the outcome over them, so that a criterion of it is "
+            "needed, such as 'robust_log_ei' (the default), and no thesis preset."
+        )
+    if not shaken and (name.scale != "exact" or averse):
         what = f"risk '{risk.name}'" if averse else f"criterion '{criterion}'"
         raise InputError(f"{what} needs input noise; give input_noise=.")
     default = "quasi_monte_carlo" if name.scale == "robust" or averse else "unscented"
