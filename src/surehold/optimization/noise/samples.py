@@ -1,6 +1,6 @@
 """Input noise given as samples: measured errors, skewed or with several modes, of any distribution.
 
-Legend: N samples e_k (N, d) of reached - commanded, in the box's units, equally likely; their mean is part of the noise.
+Legend: N samples e_k (N, d) of reached - commanded, in the box's units, all equally likely; their mean is part of it.
 
 Averages are taken over the samples themselves where they are few, else over representatives: the samples are halved
 at the median of the coordinate that is widest in the cube, the halves again, and so on; each part is represented by its
