@@ -129,6 +129,9 @@ class Optimizer:
         Probability with which every trial after the `initial_points`, which must be given and are trusted, has to keep
         all limits. By default None: trials may break them. What that guarantees, and what not, is said in
         `requirements.Requirements.admission`.
+    failures
+        What a failed trial teaches. "lowest" (default): it counts as the lowest value told. "modelled": the response is
+        learnt from the others alone, and a model of where trials succeed multiplies the criterion by that probability.
     conditions
         Of a box with uncontrolled variables, while exploring: "commanded" (default), as in a simulator: every trial
         says at which condition it is to be made. "measured", as on a robot: trials are made at whatever comes, and each
@@ -170,6 +173,7 @@ class Optimizer:
         feasible: float = FEASIBLE,
         safety: float | None = None,
         conditions: Literal["commanded", "measured"] = "commanded",
+        failures: Literal["lowest", "modelled"] = "lowest",
     ):
         given = {name: value for name, value in locals().items() if name not in ("self", "box")}
         if not isinstance(box, Box):
@@ -245,6 +249,7 @@ class Optimizer:
             seed=self.seed,
             first=first,
             preset=preset,
+            failures=failures,
         )
         rng = np.random.default_rng([self.seed, 0])
         rest = initial_design(design, max(self.n_initial - len(first), 1), box.dimension, rng)
@@ -611,6 +616,8 @@ class Optimizer:
     @property
     def posterior(self) -> Posterior:
         """The surrogate conditioned on the trials told so far; inputs in the unit cube."""
+        if self._requirements is not None and self._requirements.failures and self._trials.successful.any():
+            return self._model.posterior(self._trials.without_failed())
         return self._model.posterior(self._trials)
 
     def __repr__(self) -> str:

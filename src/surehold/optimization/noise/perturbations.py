@@ -98,6 +98,11 @@ class Perturbations:
         offsets, _ = self._at(U)
         return U[:, None, :] + offsets
 
+    def with_slopes(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """Return the perturbed points (q, s, d), and their derivatives by the query's coordinates (None: 1)."""
+        offsets, slopes = self._at(U)
+        return U[:, None, :] + offsets, slopes
+
     def outcome(self, posterior: Posterior, U: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of g at U (q, d) under each particle."""
         if self.covariance is not None:
@@ -146,7 +151,8 @@ def under_conditions(points: Quadrature, conditions: Conditions, rule: str, expo
     s, c = len(points.weights), len(taken.weights)
     if paired:
         rows = np.random.default_rng(0).permutation(np.arange(s) % c)
-        noise, weights = points.offsets.copy(), points.weights * taken.weights[rows]
+        noise = points.offsets.copy()
+        weights = points.weights * (taken.weights / np.bincount(rows, points.weights, c))[rows]
     else:
         rows = np.tile(np.arange(c), s)
         noise, weights = np.repeat(points.offsets, c, axis=0), np.repeat(points.weights, c) * taken.weights[rows]
