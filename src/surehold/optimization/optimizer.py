@@ -17,6 +17,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
+from surehold.optimization.constraints.input import region_of
 from surehold.optimization.lattice import Lattice, with_fixed
 from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
@@ -205,6 +206,8 @@ class Optimizer:
         )
         if input_noise is not None:
             input_noise.warn_if_larger_than(box)
+        self._lattice = with_fixed(lattice, box, fixed)
+        region = region_of(box, allowed, self._lattice, self.seed, first)
         self._strategy = strategy_named(
             criterion,
             Risk(risk) if isinstance(risk, str) else risk,
@@ -217,6 +220,7 @@ class Optimizer:
             noisy=getattr(model, "noisy", False) or noise_while_exploring,
             trust_region=TrustRegion(self.n_initial) if trust_region else None,
             thesis=thesis,
+            allowed=None if region is None else region.contains,
         )
         takes_noise = isinstance(model, NoisySurrogate)
         if noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
@@ -224,7 +228,6 @@ class Optimizer:
                 "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials ('gp', "
                 "'tgp', or an object with known_noise), without a thesis preset."
             )
-        self._lattice = with_fixed(lattice, box, fixed)
         self._model = ResponseModel(
             model,
             box,
@@ -239,7 +242,7 @@ class Optimizer:
         limits = limits_of(constraints)
         self._requirements = required(
             box,
-            allowed,
+            region,
             limits,
             level=feasible,
             safety=safety,
@@ -556,7 +559,12 @@ class Optimizer:
             if self.box.uncontrolled is not None:
                 u = self.box.uncontrolled.at_mean(u)
             reached = Perturbations.of(
-                self.input_noise, self.box, "quasi_monte_carlo", ranking.accurate.border, exponent=OUTCOME_EXPONENT
+                self.input_noise,
+                self.box,
+                "quasi_monte_carlo",
+                ranking.accurate.border,
+                exponent=OUTCOME_EXPONENT,
+                allowed=ranking.accurate.allowed,
             )
             highest = int(np.argmax(history.observed))
             answer = recommendation(

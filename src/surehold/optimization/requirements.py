@@ -20,7 +20,7 @@ from surehold.errors import InputError, SureholdError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.admission import Admission, Likelihood, Requirement
 from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel
-from surehold.optimization.constraints.input import Region, checked_rules
+from surehold.optimization.constraints.input import Region
 from surehold.optimization.constraints.outcome import Within, execution_probability
 from surehold.optimization.lattice import Lattice
 from surehold.optimization.limits import Limit
@@ -209,10 +209,10 @@ class Requirements:
     def admission(self, trials: Trials) -> Admission | None:
         """Return what the search for the next trial has to respect.
 
-        In safe mode, after SafeOpt (Sui et al. 2015), only inputs can be tried where the models say that a trial keeps
-        all limits with the probability `safety`. That holds as far as the models are right: they learn their length
-        scales from few trials, no bound on the outputs' smoothness is assumed, so that there is no proof, and of many
-        trials the share 1 - safety may fail. What cannot be reached through safe inputs is never found.
+        In safe mode, after SafeOpt (Sui et al. 2015), only inputs can be tried where a trial keeps all limits with the
+        probability `safety` by every particle of the models. That holds as far as one particle is right: length-scales
+        are learnt from few trials and no bound on the outputs' smoothness is assumed, so that there is no proof, and of
+        many trials the share 1 - safety may fail. What cannot be reached through safe inputs is never found.
         """
         outputs = self._outputs(trials)
         fails = self._where_it_fails(trials)
@@ -232,7 +232,7 @@ class Requirements:
         reached = ranking.accurate if self._straying is not None else Perturbations(exact(self._box.dimension))
 
         def safe(U: NDArray[np.float64]) -> NDArray[np.bool_]:
-            return execution_probability(outputs, reached, U) >= safety
+            return execution_probability(outputs, reached, U, cautious=True) >= safety
 
         return Admission(self.region, within, safe)
 
@@ -333,7 +333,7 @@ class Requirements:
 
 def required(
     box: Box,
-    allowed: Any,
+    region: Region | None,
     limits: tuple[Limit, ...],
     *,
     level: float,
@@ -348,9 +348,8 @@ def required(
 ) -> Requirements | None:
     """Return what these settings of an `Optimizer` require, None for nothing; `first` (k, d) are tried first.
 
-    Raises InputError for values out of range, settings that contradict each other, and a region without an input.
+    Raises InputError for values out of range and settings that contradict each other.
     """
-    rules = checked_rules(allowed)
     for name, value in (("feasible", level), ("safety", safety)):
         if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < 1):
             raise InputError(f"{name} is {value!r}; give a probability strictly between 0 and 1, such as 0.95.")
@@ -360,16 +359,12 @@ def required(
         )
     if failures not in ("lowest", "modelled"):
         raise unknown_name("rule for failures", failures, ("lowest", "modelled"))
-    if not rules and not limits and failures == "lowest":
+    if region is None and not limits and failures == "lowest":
         return None
     if preset is not None:
         raise InputError(
             f"preset='{preset}' chooses trials as the thesis does, which knows no constraints; leave one out."
         )
-    region = Region(box, rules, lattice, seed, first) if rules else None
-    if region is not None and not region.contains(first).all():
-        bad = first[~region.contains(first)][0]
-        raise InputError(f"initial_points hold {box.as_dict(box.from_unit(bad))}, which is not allowed.")
     return Requirements(
         box,
         region,

@@ -6,6 +6,8 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.input import Region, checked_rules
 from surehold.optimization.lattice import with_fixed
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.optimizer import Optimizer
 
 BOX = Box({"a": (0.0, 2.0), "b": (-1.0, 1.0)})
@@ -143,3 +145,38 @@ def test_a_function_that_raises_later_loses_no_trial():
     assert len(optimizer.pending) == 0
     limit[0] = 1.0
     assert optimizer.ask().shape == (2,)
+
+
+@pytest.mark.parametrize("border", ["extend", "clip", "keep"])
+def test_perturbed_points_obey_the_rule_at_the_border_of_the_region(border):
+    allowed = region("a + b <= 1", disc)
+    around = Perturbations.of(InputNoise.unit(0.1), BOX, "quasi_monte_carlo", border, allowed=allowed.contains)
+    u = np.array([[0.45, 0.3]])
+    points = around.around(u)[0]
+    free = Perturbations.of(InputNoise.unit(0.1), BOX, "quasi_monte_carlo").around(u)[0]
+    inside = allowed.contains(free)
+    assert 3 < inside.sum() < len(inside) - 3
+    assert points[inside] == pytest.approx(free[inside])
+    if border == "extend":
+        assert points == pytest.approx(free)
+    elif border == "keep":
+        assert points[~inside] == pytest.approx(np.repeat(u, (~inside).sum(), axis=0))
+    else:  # on the way to where they would have been, and no nearer than a thousandth of it to the border
+        assert allowed.contains(points).all()
+        share = (points - u)[~inside] / (free - u)[~inside]
+        assert share[:, 0] == pytest.approx(share[:, 1])
+        assert not allowed.contains(u + (share[:, :1] + 2e-3) * (free - u)[~inside]).any()
+
+
+@pytest.mark.parametrize("border", ["clip", "keep"])
+def test_a_run_with_noise_in_a_region(border):
+    optimizer = Optimizer(
+        BOX, allowed=disc, input_noise=InputNoise.unit(0.05), border=border, seed=0, direction="minimize", n_initial=6
+    )
+    for _ in range(10):
+        x = optimizer.ask()
+        assert disc(x)
+        optimizer.tell(x, x[0])
+    best = optimizer.recommend("box")
+    assert disc(best.x)
+    assert best.execution.means.min() > 0.45  # no execution leaves the disc, whose leftmost point is 0.5

@@ -18,7 +18,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.constraints.linear import Linear
 from surehold.optimization.lattice import Lattice
 
-__all__ = ["Region", "Rule", "checked_rules"]
+__all__ = ["Region", "Rule", "checked_rules", "region_of"]
 
 Rule = Linear | Callable[[NDArray[np.float64]], Any]
 
@@ -45,6 +45,23 @@ def checked_rules(allowed: Any) -> tuple[Rule, ...]:
                 "function of x (d,) that returns True or False, or a list of these."
             )
     return tuple(rules)
+
+
+def region_of(
+    box: Box, allowed: Any, lattice: Lattice | None, seed: int, first: NDArray[np.float64]
+) -> "Region | None":
+    """Return the region of `Optimizer(allowed=)`, None for all of the box; `first` (k, d) must lie in it.
+
+    Raises InputError as `checked_rules` and `Region` do, and where one of the first points is not allowed.
+    """
+    rules = checked_rules(allowed)
+    if not rules:
+        return None
+    region = Region(box, rules, lattice, seed, first)
+    if not region.contains(first).all():
+        bad = first[~region.contains(first)][0]
+        raise InputError(f"initial_points hold {box.as_dict(box.from_unit(bad))}, which is not allowed.")
+    return region
 
 
 class Region:

@@ -7,6 +7,7 @@ Legend
     g(x)     outcome under the input noise, E f(x + noise), about sum_i w_i f(x + xi_i)      [UO, thesis (3.21)]
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,9 +25,12 @@ from surehold.optimization.surrogates.gaussian_process.closed_form import closed
 from surehold.optimization.surrogates.protocol import Moments, Posterior
 from surehold.optimization.uncontrolled import Conditions
 
-__all__ = ["BORDERS", "Perturbations"]
+__all__ = ["BORDERS", "Allowed", "Perturbations"]
 
 BORDERS: Final = ("extend", "clip", "keep")
+_BISECTED: Final = 1e-3  # of a perturbation: how near to the border of what is allowed it is drawn back
+
+Allowed = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,8 @@ class Perturbations:
     """Weighted perturbations of an input, and what happens to those that leave the box.
 
     The rule at the border: "extend" lets the model be evaluated outside the box; "clip" moves a coordinate that left
-    back to the border; "keep" gives it its noise-free value, as the thesis scores its runs.
+    back to the border; "keep" gives it its noise-free value, as the thesis scores its runs. Where not all of the box is
+    `allowed`, "clip" draws the whole point back towards the commanded one, and "keep" gives it that one.
     """
 
     quadrature: Quadrature
@@ -46,6 +51,8 @@ class Perturbations:
     """(d, d) where outcomes are computed in closed form; the quadrature then serves everything else"""
     held: NDArray[np.bool_] | None = None
     """uncontrolled variables (d,): their "offsets" are the values that they take, whatever the query's"""
+    allowed: Allowed | None = None
+    """tells which points (k, d) of the cube may be commanded; the border rules "clip" and "keep" hold there, too"""
 
     def __post_init__(self) -> None:
         if self.border not in BORDERS:
@@ -61,6 +68,7 @@ class Perturbations:
         *,
         k: float = 1.0,
         exponent: int = QUASI_RANDOM_EXPONENT,
+        allowed: Allowed | None = None,
     ) -> "Perturbations":
         """Return the perturbations of an input noise by a quadrature rule; None is no noise.
 
@@ -71,6 +79,7 @@ class Perturbations:
         """
         if rule not in (*QUADRATURES, "closed_form"):
             raise unknown_name("quadrature", rule, (*QUADRATURES, "closed_form"))
+        allowed = None if border == "extend" else allowed
         if box.uncontrolled is not None:
             if rule == "closed_form":
                 raise InputError("the quadrature 'closed_form' knows no uncontrolled variables; choose another one.")
@@ -78,7 +87,12 @@ class Perturbations:
                 (exact(box.dimension), None) if noise is None else noise.kind.quadrature(box, rule, k, exponent)
             )
             return cls(
-                under_conditions(points, box.uncontrolled, rule, exponent), border, root, None, box.uncontrolled.held
+                under_conditions(points, box.uncontrolled, rule, exponent),
+                border,
+                root,
+                None,
+                box.uncontrolled.held,
+                allowed,
             )
         if noise is None:
             return cls(exact(box.dimension), border)
@@ -91,7 +105,7 @@ class Perturbations:
             covariance = noise.unit_covariance(box)
             return cls(quadrature("quasi_monte_carlo", covariance), border, None, covariance)
         points, root = noise.kind.quadrature(box, rule, k, exponent)
-        return cls(points, border, root)
+        return cls(points, border, root, allowed=allowed)
 
     def around(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the perturbed points (q, s, d) of U (q, d)."""
@@ -131,12 +145,29 @@ class Perturbations:
             return offsets, free
         points = U[:, None, :] + offsets
         inside = (points >= 0.0) & (points <= 1.0)
+        if self.allowed is not None:
+            return self._drawn_back(U, np.where(inside, offsets, 0.0) if self.border == "keep" else offsets), free
         if inside.all():
             return offsets, free
         if self.border == "keep":
             return np.where(inside, offsets, 0.0), free
         slopes = inside.astype(np.float64)
         return np.clip(points, 0.0, 1.0) - U[:, None, :], slopes if free is None else slopes * free
+
+    def _drawn_back(self, U: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return offsets (q, s, d) whose points are allowed: "keep": none; "clip": on the way there, by bisection."""
+        points = np.clip(U[:, None, :] + offsets, 0.0, 1.0)
+        offsets = (points - U[:, None, :]).reshape(-1, U.shape[1])
+        start = np.repeat(U, points.shape[1], axis=0)
+        good = np.ones(len(start), dtype=bool) if self.allowed is None else self.allowed(start + offsets)
+        share = good.astype(np.float64)
+        if self.border == "clip" and self.allowed is not None:
+            bad, step = np.flatnonzero(~good), 0.5
+            while step > _BISECTED:
+                further = share[bad] + step
+                share[bad] = np.where(self.allowed(start[bad] + further[:, None] * offsets[bad]), further, share[bad])
+                step *= 0.5
+        return (share[:, None] * offsets).reshape(points.shape)
 
 
 def under_conditions(points: Quadrature, conditions: Conditions, rule: str, exponent: int) -> Quadrature:

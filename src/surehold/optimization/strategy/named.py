@@ -7,7 +7,7 @@ from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.acquisition.scales import criterion_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.noise.perturbations import Allowed, Perturbations
 from surehold.optimization.strategy.covering import Covering
 from surehold.optimization.strategy.expected_improvement import ExpectedImprovement
 from surehold.optimization.strategy.protocol import Strategy
@@ -33,6 +33,7 @@ def strategy_named(
     noisy: bool,
     trust_region: TrustRegion | None,
     thesis: ThesisConstants | None,
+    allowed: Allowed | None = None,
 ) -> Strategy:
     """Return the strategy of these settings, as of `Optimizer`; `noisy`: whether observations carry noise.
 
@@ -58,9 +59,9 @@ def strategy_named(
         raise InputError(f"{what} needs input noise; give input_noise=.")
     default = "quasi_monte_carlo" if name.scale == "robust" or averse else "unscented"
     rule = default if quadrature is None else quadrature
-    accurate = Perturbations.of(input_noise, box, rule, border, k=k)
+    accurate = Perturbations.of(input_noise, box, rule, border, k=k, allowed=allowed)
     risk.check_weights(accurate.quadrature.weights, rule)
-    coarse = Perturbations.of(input_noise, box, "unscented", border)
+    coarse = Perturbations.of(input_noise, box, "unscented", border, allowed=allowed)
     ranking = Ranking(accurate, coarse, risk, noisy, screened=thesis is None)
     if thesis is not None:
         for setting, given in (
