@@ -132,7 +132,8 @@ def main() -> None:
             regrets = (np.array([truth(x) for x in answers]) - truth.best) / truth.width
             error = regrets.std(ddof=1) / len(regrets) ** 0.5
             print(
-                f"{name:11} {method:10} {np.median(regrets):14.2e}  {regrets.mean():.2e} +- {error:.1e}  {regrets.max():.2e}",
+                f"{name:11} {method:10} {np.median(regrets):14.2e}  {regrets.mean():.2e} +- {error:.1e}"
+                f"  {regrets.max():.2e}",
                 flush=True,
             )
 

@@ -273,7 +273,7 @@ def _told(optimizer: Optimizer, evaluation: Evaluation, index: int) -> Trial:
     try:
         optimizer.tell(asked, None if failure else y, failed=bool(failure), constraints=outputs or None)
     except InputError as error:  # of the outputs; the run is not lost for them
-        y, failure, outputs = np.nan, str(error), {}
+        y, failure, outputs = np.nan, str(error).rstrip("."), {}
         optimizer.tell(asked, failed=True)
     values = np.where(optimizer.feasible, optimizer.y, np.nan)
     best = np.nan
