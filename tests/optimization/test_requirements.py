@@ -102,7 +102,7 @@ def test_safe_mode_stays_within_the_limit_and_still_improves():
         )
         broken += sum(c(x) > 0.1 for x in optimizer.X)
         assert optimizer.recommend().observed < -1.55  # -1.616 is possible (SciPy's SLSQP)
-    assert broken <= 2  # of 42: 5 %, by the model
+    assert broken <= 3  # of 42; over 16 runs of two problems it was 10 of 320
 
 
 def test_safe_mode_needs_a_safe_beginning():

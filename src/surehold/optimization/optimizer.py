@@ -26,7 +26,7 @@ from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.recommendation import Recommendation, recommendation
-from surehold.optimization.requirements import required
+from surehold.optimization.required import required
 from surehold.optimization.response_model import ResponseModel, chosen_surrogate
 from surehold.optimization.strategy.initial_design import design as initial_design
 from surehold.optimization.strategy.named import strategy_named

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from surehold.defaults import ANCHORS, APART, SUCCESS_SHARE
-from surehold.errors import InputError, SureholdError, unknown_name
+from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.admission import Admission, Likelihood, Requirement
 from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel
@@ -36,7 +36,7 @@ from surehold.optimization.surrogates.gaussian_process.model import GaussianProc
 from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.trials import Trials, same
 
-__all__ = ["Requirements", "required"]
+__all__ = ["Requirements"]
 
 
 class Requirements:
@@ -329,52 +329,3 @@ class Requirements:
         measured = told[np.isfinite(told).all(axis=1)]
         scale = np.ptp(measured, axis=0) if len(measured) else np.ones(told.shape[1])
         return (np.maximum(self._missed(told), 0.0) / np.where(scale > 0.0, scale, 1.0)).max(axis=1, initial=0.0)
-
-
-def required(
-    box: Box,
-    region: Region | None,
-    limits: tuple[Limit, ...],
-    *,
-    level: float,
-    safety: float | None,
-    ranking: Ranking,
-    straying: InputNoise | None,
-    lattice: Lattice | None,
-    seed: int,
-    first: NDArray[np.float64],
-    preset: str | None,
-    failures: str,
-) -> Requirements | None:
-    """Return what these settings of an `Optimizer` require, None for nothing; `first` (k, d) are tried first.
-
-    Raises InputError for values out of range and settings that contradict each other.
-    """
-    for name, value in (("feasible", level), ("safety", safety)):
-        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < 1):
-            raise InputError(f"{name} is {value!r}; give a probability strictly between 0 and 1, such as 0.95.")
-    if safety is not None and (all(limit.watched for limit in limits) or not len(first)):
-        raise InputError(
-            "safety= needs constraints= with a limit, and initial_points= that are known to keep all limits."
-        )
-    if failures not in ("lowest", "modelled"):
-        raise unknown_name("rule for failures", failures, ("lowest", "modelled"))
-    if region is None and not limits and failures == "lowest":
-        return None
-    if preset is not None:
-        raise InputError(
-            f"preset='{preset}' chooses trials as the thesis does, which knows no constraints; leave one out."
-        )
-    return Requirements(
-        box,
-        region,
-        limits,
-        level=level,
-        safety=safety,
-        ranking=ranking,
-        straying=straying,
-        noise="inferred" if ranking.noisy and straying is None else "none",
-        lattice=lattice,
-        seed=seed,
-        failures=failures == "modelled",
-    )
