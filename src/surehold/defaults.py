@@ -87,6 +87,8 @@ JOINT_POINTS: Final = 512
 
 #: Quasi-random points, as a power of two, by which outcomes are averaged. python -m benchmarks.quadrature_error
 QUASI_RANDOM_EXPONENT: Final = 5
+#: Representative conditions, of uncontrolled variables, by which candidates are screened. Never measured.
+COARSE_CONDITIONS: Final = 8
 #: The same for the description of the recommended input: quantiles need more points than means. Never measured.
 OUTCOME_EXPONENT: Final = 7
 
@@ -248,9 +250,9 @@ OUTLIER_DISTANCE: Final = 5.0
 
 # --- constraints ------------------------------------------------------------------------------------------------------
 
-#: Points of a Sobol sequence that are tested for the first allowed inputs: at most so many where all constraints are
-#: linear, and where a user's function has to be called for each; and allowed ones after which the search ends. A region
-#: of one part in 100,000 of the box, or in 16,000, is found by chance in two of three cases. Never measured.
+#: Points of a Sobol sequence tested for the first allowed inputs: at most so many where all constraints are linear, and
+#: where a user's function has to be called for each; and allowed ones after which the search ends. A region of one part
+#: in 100,000 of the box, or in 16,000, is found by chance in two of three cases. Never measured.
 REGION_SEARCH: Final = 2**17
 REGION_SEARCH_CALLS: Final = 2**14
 REGION_KNOWN: Final = 256
@@ -262,3 +264,10 @@ APART: Final = 0.1
 FEASIBLE: Final = 0.95
 #: Random allowed points among which an initial design replaces those of its points that are not. Never measured.
 REGION_POOL: Final = 256
+#: Length-scales, over sqrt(d) box widths, and signal variances of the model of where trials fail, all combined and
+#: weighed by their evidence. Never measured on their own; the whole: python -m benchmarks.failures.
+FAILURE_LENGTHS: Final = (0.08, 0.16, 0.32, 0.64)
+FAILURE_SIGNALS: Final = (1.0, 6.0, 36.0)
+#: Under input noise a trial may become the answer where executions succeed with this share of the best probability
+#: among trials, if they do not with `FEASIBLE`: few failures leave the model unsure everywhere. Never measured.
+SUCCESS_SHARE: Final = 0.9

@@ -5,6 +5,8 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from surehold.cli.options import (
+    Allowed,
+    Constraint,
     Initial,
     Method,
     Noise,
@@ -16,6 +18,7 @@ from surehold.cli.options import (
     StudyStorage,
     Trials,
     checked_method,
+    limits_given,
     noise_of,
 )
 
@@ -64,6 +67,11 @@ def maximize(
     tolerate_failures: Annotated[
         bool, typer.Option("--tolerate-failures", help="Go on although the first three trials all failed.")
     ] = False,
+    constraint: Constraint = None,
+    allowed: Allowed = None,
+    feasible: Annotated[
+        float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
+    ] = 0.0,
     open_report: Open = False,
 ) -> None:
     """Find a maximum that still holds when the input is off.
@@ -100,6 +108,7 @@ def maximize(
         direction=direction,
         tolerate_failures=tolerate_failures,
         kept=kept,
+        required=limits_given(constraint, allowed, feasible),
     )
 
 

@@ -1,6 +1,6 @@
 """Options that several commands share, and how their text is read."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -9,6 +9,8 @@ from surehold.optimization.noise.input_noise import InputNoise
 
 __all__ = [
     "METHODS",
+    "Allowed",
+    "Constraint",
     "Initial",
     "Method",
     "Noise",
@@ -20,7 +22,9 @@ __all__ = [
     "StudyStorage",
     "Trials",
     "checked_method",
+    "limits_given",
     "noise_of",
+    "numbers_given",
 ]
 
 METHODS = {
@@ -53,6 +57,17 @@ StudyStorage = Annotated[
 ]
 Trials = Annotated[int | None, typer.Option(help="Number of trials, the initial ones included.")]
 Initial = Annotated[int | None, typer.Option(help="Number of trials of the initial design.")]
+Constraint = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="A limit of a further output, 'torque<=3' or '1<=torque<=3'; a name alone is recorded only. Repeatable.",
+        show_default=False,
+    ),
+]
+Allowed = Annotated[
+    list[str] | None,
+    typer.Option(help="What may be tried, a linear constraint: 'a + 2*b <= 3'. Repeatable.", show_default=False),
+]
 Noise = Annotated[
     str | None,
     typer.Option(
@@ -100,3 +115,41 @@ def _number(text: str) -> float:
         raise InputError(
             f"--noise {text!r} is not a number; give a share of every range, such as 0.03, or NAME=DEVIATION pairs."
         ) from None
+
+
+def limits_given(constraint: list[str] | None, allowed: list[str] | None, feasible: float = 0.0) -> dict[str, Any]:
+    """Return the settings of an `Optimizer` that the options stand for, those that were not given left out.
+
+    Raises InputError where a text is not understood, or an output is named twice.
+    """
+    from surehold.optimization.constraints.linear import Linear
+    from surehold.optimization.limits import limits_of, parsed_limit
+
+    limits: dict[str, Any] = {}
+    for text in constraint or ():
+        name, pair = parsed_limit(text)
+        if name in limits:
+            raise InputError(f"--constraint names {name!r} twice; give both limits at once, such as '1<={name}<=3'.")
+        limits[name] = list(pair)
+    limits_of(limits)
+    for text in allowed or ():
+        Linear.parse(text)
+    given = {"constraints": limits, "allowed": list(allowed or ()), "feasible": feasible}
+    return {name: value for name, value in given.items() if value}
+
+
+def numbers_given(text: str) -> dict[str, float] | None:
+    """Return {name: value} of --constraints NAME=VALUE,...; None where there is none.
+
+    Raises InputError for values that are no numbers.
+    """
+    from surehold.studies.parameter_text import parse_assignments
+
+    if not text:
+        return None
+    try:
+        return {name: float(value) for name, value in parse_assignments(text, "--constraints").items()}
+    except InputError:
+        raise
+    except ValueError:
+        raise InputError(f"--constraints {text!r} holds what is no number; write torque=3.1,force=2.") from None

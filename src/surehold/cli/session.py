@@ -90,11 +90,14 @@ def run_session(
     outcomes: Callable[[Result], Mapping[str, int]] = lambda result: {},
     advice: str = "",
     kept: Kept | None = None,
+    required: Mapping[str, Any] | None = None,
     console: Console | None = None,
 ) -> RunReport:
     """Optimize, score, write and show; Ctrl-C and SIGTERM keep what was done.
 
     A run that is kept as a study is resumed where that exists.
+
+    `required` are the settings of an `Optimizer` for constraints: allowed, constraints, feasible.
 
     `describe` adds to a candidate what the problem knows of it; `also_write` writes further files. Where no trial is
     worth more than `success_above`, the report says so first, with the counts of `outcomes` and `advice`; what the
@@ -127,6 +130,7 @@ def run_session(
             "seed": seed,
             "preset": preset or None,
             "direction": direction,
+            **(required or {}),
         }
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
@@ -208,7 +212,8 @@ def _with_progress(
             robust = None if trial.recommendation is None else trial.recommendation.mean
             show(trial.index + 1, trial.best, robust)
 
-        return maximize(problem, problem.box, trials, callback=told, tolerate_failures=tolerate_failures, **options)
+        function = getattr(problem, "trial", problem)
+        return maximize(function, problem.box, trials, callback=told, tolerate_failures=tolerate_failures, **options)
 
 
 def _as_study(
@@ -226,7 +231,7 @@ def _as_study(
     from surehold.studies.worker import work
 
     logging.set_verbosity(logging.WARNING)
-    optimizer = {name: options[name] for name in ("seed", "n_initial", "preset") if options[name] is not None}
+    optimizer = {name: value for name, value in options.items() if name != "input_noise" and value is not None}
     space = SearchSpace(problem.box)
     settings = StudySettings(space, options["input_noise"], units, optimizer, kept.problem, options["direction"])
     storage = kept.storage or os.environ.get("SUREHOLD_STORAGE", "")
@@ -249,7 +254,7 @@ def _as_study(
             show(len(finished), best(values, default=np.nan), robust)
 
         try:
-            work(study, trial_function(problem, space), after=told)
+            work(study, trial_function(getattr(problem, "trial", problem), space), after=told)
         except KeyboardInterrupt:
             interrupted = True
     if not any(t.values for t in study.trials()):

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from surehold.cli import study_people, study_service
-from surehold.cli.study_options import Json, Name, Storage, opened, quiet, say, write_out
+from surehold.cli.options import Allowed, Constraint
+from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, quiet, say, write_out
 
 __all__ = ["studies"]
 
@@ -68,11 +69,16 @@ def create(
     ] = "none",
     preset: Annotated[str, typer.Option(help="Settings by name, such as thesis.", show_default=False)] = "",
     direction: Annotated[str, typer.Option(help="Of the values: maximize or minimize.")] = "maximize",
+    constraint: Constraint = None,
+    allowed: Allowed = None,
+    feasible: Annotated[
+        float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
+    ] = 0.0,
     storage: Storage = "",
     as_json: Json = False,
 ) -> None:
     """Create a study."""
-    from surehold.cli.options import noise_of
+    from surehold.cli.options import limits_given, noise_of
     from surehold.studies.parameter_text import parse_assignments
     from surehold.studies.robot import RobotStudy
     from surehold.studies.settings import StudySettings
@@ -83,6 +89,7 @@ def create(
     optimizer |= {} if risk == "mean" else {"risk": risk}
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
     optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
+    optimizer |= limits_given(constraint, allowed, feasible)
     input_noise = None if noise.strip().lower() == "none" else noise_of(noise, "bo")
     if space.box is None or space.box.numbers is None:
         input_noise = None  # choices carry none
@@ -129,14 +136,17 @@ def tell(
     reached: Annotated[
         str, typer.Option(help="What was truly reached, where it differs: NAME=VALUE,...", show_default=False)
     ] = "",
+    constraints: Outputs = "",
     storage: Storage = "",
     as_json: Json = False,
 ) -> None:
     """Tell what came of a trial; the same answer twice is harmless, another one is refused."""
+    from surehold.cli.options import numbers_given
     from surehold.studies.parameter_text import parse_assignments
 
     places = parse_assignments(reached, "--reached") if reached else None
-    told = opened(name, storage).tell(id, value, failed=failed, reached=places)
+    outputs = numbers_given(constraints)
+    told = opened(name, storage).tell(id, value, failed=failed, reached=places, constraints=outputs)
     outcome = "failed" if told.value is None else f"value {told.value!r}"
     found = {"id": told.id, "state": told.state, "value": told.value, "already": told.already}
     say(found, f"trial {told.id}: {outcome}{', as told before' * told.already}", as_json)
@@ -149,7 +159,9 @@ def recommend(name: Name, storage: Storage = "", as_json: Json = False) -> None:
     lines = [f"trial {best.trial}: expect {best.mean:.4g} ± {best.std:.2g}, 95 % better than {best.quantile:.4g}"]
     units = study.settings.units
     lines += [f"  {key} = {value} {units.get(key, '')}".rstrip() for key, value in best.parameters.items()]
-    lines += [text for text in (best.refused, best.warning) if text]
+    lines += [f"  expected {key} {value:.4g}" for key, value in best.outputs.items()]
+    lines += [f"{best.feasible:.1%} of executions keep all constraints"] if study.sampler.outputs else []
+    lines += [text for text in (best.infeasible, best.refused, best.warning) if text]
     say(best.as_dict() | {"units": dict(units)}, "\n".join(lines), as_json)
 
 

@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from surehold.studies.robot import RobotStudy
 
-__all__ = ["Json", "Name", "Storage", "opened", "quiet", "say", "write_out"]
+__all__ = ["Json", "Name", "Outputs", "Storage", "opened", "quiet", "say", "write_out"]
 
 Name = Annotated[str, typer.Argument(help="Name of the study.")]
 Storage = Annotated[
@@ -22,6 +22,7 @@ Storage = Annotated[
         show_default=False,
     ),
 ]
+Outputs = Annotated[str, typer.Option(help="Further outputs, such as torque=3.1: NAME=VALUE,...", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="Answer in JSON, one object.")]
 
 

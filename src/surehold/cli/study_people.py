@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from surehold.cli.study_options import Json, Name, Storage, opened, say
+from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, say
 from surehold.errors import InputError
 
 __all__ = ["commands"]
@@ -52,13 +52,16 @@ def add(
     at: Annotated[str, typer.Option(help="Where the trial was made: NAME=VALUE,... for every parameter.")],
     value: Annotated[str | None, typer.Argument(help="Outcome, larger is better.", show_default=False)] = None,
     failed: Annotated[bool, typer.Option("--failed", help="The trial gave nothing.")] = False,
+    constraints: Outputs = "",
     storage: Storage = "",
     as_json: Json = False,
 ) -> None:
     """Add a trial that was made by hand."""
+    from surehold.cli.options import numbers_given
     from surehold.studies.parameter_text import parse_assignments
 
-    id = opened(name, storage).add(parse_assignments(at, "--at"), value, failed=failed)
+    outputs = numbers_given(constraints)
+    id = opened(name, storage).add(parse_assignments(at, "--at"), value, failed=failed, constraints=outputs)
     say({"id": id}, f"trial {id}: added", as_json)
 
 

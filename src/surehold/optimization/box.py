@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError
 from surehold.optimization.points import named_rows, points_of
+from surehold.optimization.uncontrolled import Conditions, bounds_of, conditions_of
 from surehold.optimization.variables import Choice, Number, Variable, variable_of
 
 __all__ = ["Box"]
@@ -22,6 +23,11 @@ class Box:
         `{name: (lower, upper)}` with finite `lower < upper`, in the user's units. Behind the bounds may stand "log"
         (the search is even in the logarithm), "int" (whole numbers) or "step=0.5" (levels from lower on). A list of
         texts (or booleans) is a choice between them.
+    uncontrolled
+        Variables that are drawn or measured when the answer is used, not set: {name: samples (N,)}, {name: a
+        distribution of scipy.stats}, or {(name, name): samples (N, 2)} of such that depend on each other. Those that
+        have no bounds get the range of their samples (of a distribution, of all but one in a thousand at either end)
+        and stand behind the others. They are numbers, neither logarithmic nor in steps.
 
     Attributes
     ----------
@@ -29,6 +35,7 @@ class Box:
     plain : bool, whether every variable is a number of a linear scale that can take every value
     names : tuple of str, names of the d coordinates: of the variables in a plain box, else see below
     lower, upper : (d,) float64, read-only, of the coordinates
+    uncontrolled : Conditions, None where all variables are set
 
     The coordinates of a box that is not plain are the logarithm of a logarithmic variable, and one of [0, 1] for each
     text of a choice, 1 for the one that is taken. Whoever works with names (`encode`, `as_dict`, dictionaries told to
@@ -50,7 +57,9 @@ class Box:
     {'force': 1.0, 'fingers': 3, 'grip': 'power'}
     """
 
-    def __init__(self, bounds: Mapping[str, Any]):
+    def __init__(self, bounds: Mapping[str, Any], *, uncontrolled: Mapping[Any, Any] | None = None):
+        if uncontrolled is not None and isinstance(bounds, Mapping):
+            bounds = bounds_of(bounds, uncontrolled)
         if not isinstance(bounds, Mapping) or len(bounds) == 0:
             raise InputError(
                 f"bounds are {bounds!r}; give a mapping such as {{'dx': (-0.05, 0.05)}} of one or more names."
@@ -68,6 +77,7 @@ class Box:
         self.names: Final[tuple[str, ...]] = tuple(names)
         self.lower: Final[NDArray[np.float64]] = np.array([pair[0] for pair in limits])
         self.upper: Final[NDArray[np.float64]] = np.array([pair[1] for pair in limits])
+        self.uncontrolled: Final[Conditions | None] = conditions_of(self.names, self.lower, self.upper, uncontrolled)
         self.lower.flags.writeable = False
         self.upper.flags.writeable = False
 
@@ -191,7 +201,11 @@ class Box:
         return snapped
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Box) and self.variables == other.variables
+        return (
+            isinstance(other, Box)
+            and self.variables == other.variables
+            and _same(self.uncontrolled, other.uncontrolled)
+        )
 
     def __hash__(self) -> int:
         return hash(self.variables)
@@ -204,3 +218,9 @@ class Box:
             return f"({', '.join([f'{variable.low:g}', f'{variable.high:g}', *words])})"
 
         return f"Box({{{', '.join(f'{v.name!r}: {shown(v)}' for v in self.variables)}}})"
+
+
+def _same(mine: Conditions | None, other: Conditions | None) -> bool:
+    if mine is None or other is None:
+        return mine is other
+    return np.array_equal(mine.held, other.held) and np.array_equal(mine.samples, other.samples)

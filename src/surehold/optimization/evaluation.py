@@ -1,6 +1,6 @@
 """Trying inputs: a user's function called here, one trial after the other, or in processes of its own."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from time import perf_counter
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -24,12 +24,16 @@ class Evaluation(NamedTuple):
     """NaN where it failed"""
     failure: str
     """why it failed, empty where it did not"""
+    outputs: Mapping[str, Any]
+    """further outputs, such as {"torque": 3.1}"""
     seconds: float
     """time that asking took"""
 
 
-def evaluate(f: Callable[[Any], Any], x: NDArray[np.float64] | dict[str, Any]) -> tuple[float, str]:
-    """Return f(x) and an empty text, or NaN and why there is no finite number.
+def evaluate(f: Callable[[Any], Any], x: NDArray[np.float64] | dict[str, Any]) -> tuple[float, str, Mapping[str, Any]]:
+    """Return f(x) and an empty text, or NaN and why there is no finite number; and further outputs.
+
+    f returns a number, or a number and a dictionary of further outputs.
 
     Raises
     ------
@@ -42,7 +46,14 @@ def evaluate(f: Callable[[Any], Any], x: NDArray[np.float64] | dict[str, Any]) -
         if isinstance(error, TypeError) and _in_the_call(error.__traceback__):
             what = f"dictionary of {', '.join(x)}" if isinstance(x, dict) else f"array x of shape {x.shape}"
             raise InputError(f"the function cannot be called with one {what}: {error}.") from None
-        return np.nan, f"{type(error).__name__}: {error}"
+        return np.nan, f"{type(error).__name__}: {error}", {}
+    outputs: Mapping[str, Any] = {}
+    if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], Mapping):
+        value, outputs = value
+    return *_number(value), outputs
+
+
+def _number(value: Any) -> tuple[float, str]:
     if value is None:
         return np.nan, "returned None instead of a number; does it lack a return"
     try:
@@ -95,7 +106,7 @@ def in_processes(optimizer: Optimizer, f: Callable[..., Any], n_trials: int, n_j
     from joblib.externals.loky import ProcessPoolExecutor
 
     pool = ProcessPoolExecutor(max_workers=n_jobs)
-    running: dict[Future[tuple[float, str]], tuple[AskedTrial, float]] = {}
+    running: dict[Future[tuple[float, str, Mapping[str, Any]]], tuple[AskedTrial, float]] = {}
     begun = 0
     try:
         while begun < n_trials or running:

@@ -1,5 +1,6 @@
 """Limits of further outputs of a trial: given at construction, held against what is told."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
 
-__all__ = ["Limit", "checked_outputs", "limits_of"]
+__all__ = ["Limit", "checked_outputs", "limits_of", "parsed_limit"]
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,26 @@ def limits_of(constraints: Mapping[str, Sequence[float | None]] | None) -> tuple
     return tuple(found)
 
 
+def parsed_limit(text: str) -> tuple[str, tuple[float | None, float | None]]:
+    """Return the name and the limits that a text describes: "torque <= 3", "1 <= torque <= 3", "torque >= 1".
+
+    A name alone is an output that is recorded only. Raises InputError where the text does not follow the form.
+    """
+    parts = [part.strip() for part in re.split(r"(<=|>=|<|>)", text)]
+    sides, signs = parts[::2], {sign[0] for sign in parts[1::2]}
+    named = [i for i, side in enumerate(sides) if not _is_number(side)]
+    middle = {1: [0], 2: [0, 1], 3: [1]}.get(len(sides), [])
+    if len(signs) > 1 or len(named) != 1 or named[0] not in middle or not sides[named[0]]:
+        raise InputError(f"constraint {text!r} is not understood; write 'torque<=3', '1<=torque<=3' or 'torque>=1'.")
+    name, numbers = sides[named[0]], [float(side) for i, side in enumerate(sides) if i != named[0]]
+    if len(sides) == 1:
+        return name, (None, None)
+    if len(sides) == 3:
+        return name, (numbers[0], numbers[1]) if signs == {"<"} else (numbers[1], numbers[0])
+    above = (signs == {">"}) == (named[0] == 0)
+    return name, (numbers[0], None) if above else (None, numbers[0])
+
+
 def checked_outputs(
     limits: tuple[Limit, ...], told: Mapping[str, float | None] | None, failed: bool
 ) -> tuple[float, ...]:
@@ -100,6 +121,14 @@ def checked_outputs(
             raise InputError(f"constraint '{limit.name}' is {value!r}; give one finite number, or None.")
         found.append(number)
     return tuple(found)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _number(value: Any) -> float:

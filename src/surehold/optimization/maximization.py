@@ -1,8 +1,8 @@
 """A whole run: ask, try, tell, until the budget is spent."""
 
 import os
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
@@ -46,6 +46,8 @@ class Trial:
         What would be recommended now; None during the initial design.
     seconds
         Time that asking took.
+    outputs
+        Further outputs, such as {"torque": 3.1}.
     """
 
     index: int
@@ -55,6 +57,7 @@ class Trial:
     best: float
     recommendation: Recommendation | None
     seconds: float
+    outputs: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         what = self.failure or f"y={self.y:.6g}"
@@ -97,8 +100,10 @@ class Result:
 
     @property
     def best_index(self) -> int:
-        """Index of the trial with the best value."""
-        return int(np.nanargmin(self.y) if self.optimizer.direction == "minimize" else np.nanargmax(self.y))
+        """Index of the trial with the best value, of feasible ones where there are any."""
+        y = np.where(self.optimizer.feasible, self.y, np.nan)
+        y = y if np.isfinite(y).any() else self.y
+        return int(np.nanargmin(y) if self.optimizer.direction == "minimize" else np.nanargmax(y))
 
     def to_dataframe(self) -> "DataFrame":
         """Return the trials as a table of pandas: one column a variable, then value, failure, best and seconds.
@@ -175,8 +180,9 @@ def maximize(
     ----------
     f
         Takes x (d,) in the box's units, or a dictionary {name: value} where the box has logarithms, whole numbers or
-        choices; returns a number. A trial that raises, or gives anything but one finite
-        number, is recorded as failed and the run goes on.
+        choices; returns a number, with `constraints` a number and a dictionary of the further outputs,
+        (y, {"torque": 3.1}). A trial that raises, or gives anything but one finite number, is recorded as failed and
+        the run goes on.
     n_trials
         Budget, initial design included.
     callback
@@ -194,7 +200,8 @@ def maximize(
         Whether a progress bar is shown once a run takes more than two seconds; by default where there is no callback
         and the output is a terminal.
     **settings
-        Of `Optimizer`: input_noise, surrogate, criterion, n_initial, initial_points, fixed, seed, noise, preset, ...
+        Of `Optimizer`: input_noise, surrogate, criterion, n_initial, initial_points, fixed, allowed, constraints, seed,
+        noise, preset, ...
 
     Ctrl-C ends the run and keeps what was done.
 
@@ -283,14 +290,18 @@ def _optimizer(box: Box, n_trials: int, settings: dict[str, Any]) -> Optimizer:
 
 
 def _told(optimizer: Optimizer, evaluation: Evaluation, index: int) -> Trial:
-    asked, y, failure, seconds = evaluation
-    optimizer.tell(asked, None if failure else y, failed=bool(failure))
-    values = optimizer.y
+    asked, y, failure, outputs, seconds = evaluation
+    try:
+        optimizer.tell(asked, None if failure else y, failed=bool(failure), constraints=outputs or None)
+    except InputError as error:  # of the outputs; the run is not lost for them
+        y, failure, outputs = np.nan, str(error).rstrip("."), {}
+        optimizer.tell(asked, failed=True)
+    values = np.where(optimizer.feasible, optimizer.y, np.nan)
     best = np.nan
     if np.any(np.isfinite(values)):
         best = float(np.nanmin(values) if optimizer.direction == "minimize" else np.nanmax(values))
-    modelled = len(values) >= optimizer.n_initial and np.isfinite(best)
-    return Trial(index, asked.x, y, failure, best, optimizer.recommend() if modelled else None, seconds)
+    modelled = len(values) >= optimizer.n_initial and np.isfinite(optimizer.y).any()
+    return Trial(index, asked.x, y, failure, best, optimizer.recommend() if modelled else None, seconds, outputs)
 
 
 def _ends(callback: Callable[[Trial], Any], trial: Trial) -> bool:

@@ -17,8 +17,8 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
+from surehold.optimization.constraints.input import region_of
 from surehold.optimization.diagnosis import Diagnosis
-from surehold.optimization.lattice import lattice_of
 from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise, noise_of_coordinates
@@ -26,7 +26,7 @@ from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.recommendation import Recommendation, recommendation
-from surehold.optimization.requirements import required
+from surehold.optimization.required import required
 from surehold.optimization.response_model import ResponseModel, chosen_surrogate
 from surehold.optimization.strategy.initial_design import design as initial_design
 from surehold.optimization.strategy.named import strategy_named
@@ -134,6 +134,14 @@ class Optimizer:
         Probability with which every trial after the `initial_points`, which must be given and are trusted, has to keep
         all limits. By default None: trials may break them. What that guarantees, and what not, is said in
         `requirements.Requirements.admission`.
+    failures
+        What a failed trial teaches. "lowest" (default): it counts as the lowest value told. "modelled": the response is
+        learnt from the others alone, and a model of where trials succeed multiplies the criterion by that probability.
+    conditions
+        Of a box with uncontrolled variables, while exploring: "commanded" (default), as in a simulator: every trial
+        says at which condition it is to be made. "measured", as on a robot: trials are made at whatever comes, and each
+        tells it (`tell(x, y, reached={"payload": 1.3})`); what `ask` says of these variables is their mean. The answer
+        is good on average over them, or by `risk`, and holds their mean, which nobody sets.
 
     Raises
     ------
@@ -168,6 +176,8 @@ class Optimizer:
         constraints: Mapping[str, Any] | None = None,
         feasible: float = FEASIBLE,
         safety: float | None = None,
+        conditions: Literal["commanded", "measured"] = "commanded",
+        failures: Literal["lowest", "modelled"] = "lowest",
     ):
         given = {name: value for name, value in locals().items() if name not in ("self", "box")}
         if not isinstance(box, Box):
@@ -200,6 +210,8 @@ class Optimizer:
         )
         if input_noise is not None:
             input_noise.warn_if_larger_than(box)
+        self._lattice = lattice_of(box, fixed)
+        region = region_of(box, allowed, self._lattice, self.seed, first)
         self._strategy = strategy_named(
             criterion,
             Risk(risk) if isinstance(risk, str) else risk,
@@ -212,6 +224,7 @@ class Optimizer:
             noisy=getattr(model, "noisy", False) or noise_while_exploring,
             trust_region=TrustRegion(self.n_initial) if trust_region else None,
             thesis=thesis,
+            allowed=None if region is None else region.contains,
         )
         takes_noise = isinstance(model, NoisySurrogate)
         if noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
@@ -219,7 +232,6 @@ class Optimizer:
                 "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials "
                 "('two_scales', 'gp', 'tgp', or an object with known_noise), without a thesis preset."
             )
-        self._lattice = lattice_of(box, fixed)
         self._model = ResponseModel(
             model,
             box,
@@ -228,10 +240,13 @@ class Optimizer:
             continues_chains=self._strategy.continues_chains,
             seed=self.seed,
         )
+        if conditions not in ("commanded", "measured"):
+            raise unknown_name("conditions", conditions, ("commanded", "measured"))
+        self._measured: Final = box.uncontrolled is not None and conditions == "measured"
         limits = limits_of(constraints)
         self._requirements = required(
             box,
-            allowed,
+            region,
             limits,
             level=feasible,
             safety=safety,
@@ -241,6 +256,7 @@ class Optimizer:
             seed=self.seed,
             first=first,
             preset=preset,
+            failures=failures,
         )
         rng = np.random.default_rng([self.seed, 0])
         rest = initial_design(design, max(self.n_initial - len(first), 1), box.dimension, rng)
@@ -273,6 +289,16 @@ class Optimizer:
     def pending(self) -> NDArray[np.float64]:
         """Inputs asked for and not told yet, (p, d), in the box's units."""
         return self.box.from_unit(self._trials.pending)
+
+    @property
+    def outputs(self) -> dict[str, NDArray[np.float64]]:
+        """Further outputs told so far by name, (t,) each; NaN where one was not measured."""
+        return {limit.name: self._trials.outputs[:, k] for k, limit in enumerate(self._trials.limits)}
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Whether each trial may become the answer, (t,): it gave a value and satisfies all that is required."""
+        return self._trials.successful if self._requirements is None else self._requirements.feasible(self._trials)
 
     @property
     def reached(self) -> NDArray[np.float64]:
@@ -318,7 +344,21 @@ class Optimizer:
             `AskedTrial` has been told before; if y is missing, not finite or not a number; if a failed trial comes with
             a value; if an output is missing, unknown or not finite. Nothing told before is lost.
         """
+        if self._measured:
+            reached = self._with_conditions(x, reached)
         self._trials.tell(x, None if y is None else self._sign * number_of(y), failed, reached, constraints)
+
+    def _with_conditions(self, x: Any, reached: Any) -> Any:
+        """Return the reached input, of which only the uncontrolled variables must be said."""
+        held = self.box.uncontrolled
+        names = [] if held is None else [n for n, h in zip(self.box.names, held.held, strict=True) if h]
+        if reached is None or (isinstance(reached, Mapping) and not set(names) <= set(reached)):
+            raise InputError(
+                f"the trial says nothing about {', '.join(names)}, which nobody sets; tell "
+                f"reached={{{', '.join(f'{name!r}: value' for name in names)}}}."
+            )
+        commanded = self.box.as_dict(x.x if isinstance(x, AskedTrial) else x)
+        return {**commanded, **reached} if isinstance(reached, Mapping) else reached
 
     def forget(self, x: Any) -> None:
         """Drop a pending trial, an `AskedTrial` or its x (d,), that will never be told; its number is asked for again.
@@ -462,6 +502,8 @@ class Optimizer:
             with single_threaded():
                 u = self._propose(self._rng(2, position))
         u = self._snapped(u)
+        if self.box.uncontrolled is not None and self._measured:
+            u = self.box.uncontrolled.at_mean(u)
         x = self.box.from_unit(u)
         return AskedTrial(self._trials.ask(position, u), x, self.box.as_dict(x))
 
@@ -532,8 +574,15 @@ class Optimizer:
                 rng = self._rng(3, len(self._trials))
                 strict = None if self._requirements is None else self._requirements.strict(self._trials)
                 u, observed = self._snapped(ranking.best(posterior, history.tried, rng, strict)), np.nan
+            if self.box.uncontrolled is not None:
+                u = self.box.uncontrolled.at_mean(u)
             reached = Perturbations.of(
-                self.input_noise, self.box, "quasi_monte_carlo", ranking.accurate.border, exponent=OUTCOME_EXPONENT
+                self.input_noise,
+                self.box,
+                "quasi_monte_carlo",
+                ranking.accurate.border,
+                exponent=OUTCOME_EXPONENT,
+                allowed=ranking.accurate.allowed,
             )
             highest = int(np.argmax(history.observed))
             answer = recommendation(
@@ -601,6 +650,8 @@ class Optimizer:
     @property
     def posterior(self) -> Posterior:
         """The surrogate conditioned on the trials told so far; inputs in the unit cube."""
+        if self._requirements is not None and self._requirements.failures and self._trials.successful.any():
+            return self._model.posterior(self._trials.without_failed())
         return self._model.posterior(self._trials)
 
     def plot_slice(self, x: Any = None) -> "Figure":

@@ -25,31 +25,36 @@ _LEVEL: Final = 0.05
 
 @dataclass(frozen=True)
 class Outcome:
-    """A distribution of values: an equally weighted mixture of normals."""
+    """A distribution of values: a mixture of normals."""
 
     means: NDArray[np.float64]
     """(c,)"""
     stds: NDArray[np.float64]
     """(c,)"""
+    weights: NDArray[np.float64] | None = None
+    """(c,), summing to 1; None where all are equal"""
 
     @property
     def mean(self) -> float:
         """Mean of the distribution."""
-        return float(self.means.mean())
+        return self._average(self.means)
+
+    def _average(self, values: NDArray[np.float64]) -> float:
+        return float(values.mean() if self.weights is None else values @ self.weights)
 
     @property
     def std(self) -> float:
         """Standard deviation, by the law of total variance."""
-        spread = self.means - self.means.mean()
+        spread = self.means - self.mean
         unit = max(float(self.stds.max()), float(np.abs(spread).max())) or 1.0  # squares may overflow
-        return unit * float(np.sqrt(np.mean((self.stds / unit) ** 2) + np.mean((spread / unit) ** 2)))
+        return unit * float(np.sqrt(self._average((self.stds / unit) ** 2) + self._average((spread / unit) ** 2)))
 
     def probability_below(self, value: float) -> float:
         """Return the probability of a value below `value`."""
         from scipy.special import ndtr
 
         scale = np.maximum(self.stds, 1e-12 * max(float(np.ptp(self.means)), 1e-300))
-        return float(ndtr((value - self.means) / scale).mean())
+        return self._average(ndtr((value - self.means) / scale))
 
     def quantile(self, level: float) -> float:
         """Return the value below which the share `level` of the distribution lies, by bisection."""
@@ -146,14 +151,18 @@ def outliers_in_words(numbers: Sequence[int]) -> str:
 def execution_at(
     posterior: Posterior, reached: Perturbations, u: NDArray[np.float64], noise_variance: float | None = None
 ) -> Outcome:
-    """Return what to expect of one execution at u (d,) whose perturbations have equal weights.
+    """Return what to expect of one execution at u (d,) whose perturbations have no negative weights.
 
     `noise_variance` is that of the observations where it is known; by default the surrogate's.
     """
     points = reached.around(u[None, :])[0]
     moments = posterior.moments(points)
     noise = posterior.noise_variance(points) if noise_variance is None else noise_variance  # (m, s) or a number
-    return Outcome(moments.mean.ravel(), np.sqrt(moments.variance + noise).ravel())
+    weights = reached.quadrature.weights
+    each = None
+    if np.ptp(weights) > 0.0:
+        each = np.tile(weights / len(moments.mean), len(moments.mean))
+    return Outcome(moments.mean.ravel(), np.sqrt(moments.variance + noise).ravel(), each)
 
 
 def expectation_at(posterior: Posterior, reached: Perturbations, u: NDArray[np.float64]) -> Outcome:
@@ -209,7 +218,7 @@ def recommendation(
         refused,
         warning,
         outliers,
-        Outcome(sign * outcome.means, outcome.stds),
+        Outcome(sign * outcome.means, outcome.stds, outcome.weights),
         Outcome(sign * expectation.means, expectation.stds),
         box.as_dict(x),
     )

@@ -15,14 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from surehold.defaults import ANCHORS, APART
+from surehold.defaults import ANCHORS, APART, SUCCESS_SHARE
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
-from surehold.optimization.constraints.admission import Admission, Likelihood
-from surehold.optimization.constraints.input import Region, checked_rules
+from surehold.optimization.constraints.admission import Admission, Likelihood, Requirement
+from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel
+from surehold.optimization.constraints.input import Region
 from surehold.optimization.constraints.outcome import Within, execution_probability
 from surehold.optimization.lattice import Lattice
 from surehold.optimization.limits import Limit
+from surehold.optimization.maximizer.holes import largest_holes
 from surehold.optimization.maximizer.multistart import multistart
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
@@ -34,7 +36,7 @@ from surehold.optimization.surrogates.gaussian_process.model import GaussianProc
 from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.trials import Trials, same
 
-__all__ = ["Requirements", "required"]
+__all__ = ["Requirements"]
 
 
 class Requirements:
@@ -54,6 +56,8 @@ class Requirements:
         The input noise of the trials themselves; None if they reach what is commanded.
     noise
         Observation noise of the outputs: "none" or "inferred".
+    failures
+        Whether it is learnt where trials fail.
     """
 
     def __init__(
@@ -69,7 +73,9 @@ class Requirements:
         noise: NoiseName,
         lattice: Lattice | None,
         seed: int,
+        failures: bool = False,
     ):
+        self.failures: Final = failures
         self.region: Final = region
         self.limits: Final = limits
         self.level: Final = level
@@ -81,12 +87,16 @@ class Requirements:
         self._lattice: Final = lattice
         self._seed: Final = seed
         self._limited: Final = tuple(k for k, limit in enumerate(limits) if not limit.watched)
+        self._success: tuple[int, SuccessModel] | None = None
+        self._cautious: Final[dict[int, tuple[int, Posterior]]] = {}
         self._models: Final = {k: self._model(GaussianProcess(noise=noise), k) for k in range(len(limits))}
 
     def forget(self) -> None:
         """Drop what was learnt: the trials are others from now on."""
         for model in self._models.values():
             model.forget()
+        self._cautious.clear()
+        self._success = None
 
     # --- which trials are feasible --------------------------------------------------------------------------------
 
@@ -112,7 +122,20 @@ class Requirements:
 
     def feasible(self, trials: Trials) -> NDArray[np.bool_]:
         """Tell which trials may become the answer, (t,)."""
-        return trials.eligible & (self.feasibility(trials) >= self.level)
+        found = trials.eligible & (self.feasibility(trials) >= self.level)
+        model = self._where_it_fails(trials)
+        if model is None or self._ranking.exact_inputs or not found.any():
+            return found
+        share = np.exp(Succeeds(model, self._ranking.accurate).log_probability(trials.places[found])[0])
+        found[found] = share >= min(self.level, SUCCESS_SHARE * share.max())
+        return found
+
+    def _where_it_fails(self, trials: Trials) -> SuccessModel | None:
+        if not self.failures or trials.successful.all():
+            return None
+        if self._success is None or self._success[0] != len(trials):
+            self._success = (len(trials), SuccessModel(trials.reached, trials.successful))
+        return self._success[1]
 
     def shortfall(self, trials: Trials) -> str:
         """Return in words that nothing feasible is known, and what came nearest; empty where something is."""
@@ -183,26 +206,33 @@ class Requirements:
 
     # --- where to search ------------------------------------------------------------------------------------------
 
-    def admission(self, trials: Trials) -> Admission:
+    def admission(self, trials: Trials) -> Admission | None:
         """Return what the search for the next trial has to respect.
 
-        In safe mode, after SafeOpt (Sui et al. 2015), only inputs can be tried where the models say that a trial keeps
-        all limits with the probability `safety`. That holds as far as the models are right: they learn their length
-        scales from few trials, no bound on the outputs' smoothness is assumed, so that there is no proof, and of many
-        trials the share 1 - safety may fail. What cannot be reached through safe inputs is never found.
+        In safe mode, after SafeOpt (Sui et al. 2015), only inputs can be tried where a trial keeps all limits with the
+        probability `safety` by every particle of the models. That holds as far as one particle is right: length-scales
+        are learnt from few trials and no bound on the outputs' smoothness is assumed, so that there is no proof, and of
+        many trials the share 1 - safety may fail. What cannot be reached through safe inputs is never found.
         """
         outputs = self._outputs(trials)
+        fails = self._where_it_fails(trials)
+        if self.region is None and not outputs and fails is None:
+            return None
         share = 1.0 - (1.0 - self.level) / max(len(self._limited), 1)
         ranking = self._ranking
         perturbations = Perturbations(exact(self._box.dimension)) if ranking.exact_inputs else ranking.coarse
-        within = tuple(Within(posterior, limit, perturbations, float(ndtri(share))) for posterior, limit in outputs)
+        within: tuple[Requirement, ...] = tuple(
+            Within(posterior, limit, perturbations, float(ndtri(share))) for posterior, limit in outputs
+        )
+        if fails is not None:
+            within = (*within, Succeeds(fails, perturbations))
         safety = self.safety
         if safety is None:
             return Admission(self.region, within)
         reached = ranking.accurate if self._straying is not None else Perturbations(exact(self._box.dimension))
 
         def safe(U: NDArray[np.float64]) -> NDArray[np.bool_]:
-            return execution_probability(outputs, reached, U) >= safety
+            return execution_probability(outputs, reached, U, cautious=True) >= safety
 
         return Admission(self.region, within, safe)
 
@@ -216,7 +246,7 @@ class Requirements:
                 f"nothing is known to be safe: {self.shortfall(trials)} Give initial_points= that keep all limits."
             )
         anchors = trials.places[np.argsort(-self.feasibility(trials), kind="stable")[:ANCHORS]]
-        admission = self.admission(trials)
+        admission = self.admission(trials) or Admission()
         found = multistart(Likelihood(), Likelihood(), self._box.dimension, anchors, rng, None, admission)
         if not len(trials.pending) or not len(found):
             return found
@@ -241,6 +271,11 @@ class Requirements:
         """Return a point (d,) to try where no candidate is left: a random one; in safe mode the safest tried one."""
         if self.safety is not None:
             return trials.places[int(np.argmax(np.where(trials.eligible, self.feasibility(trials), -1.0)))]
+        points = np.concatenate([trials.places, trials.pending])
+        if self.failures and len(points):  # nothing has succeeded: where nothing has been tried
+            holes = largest_holes(points, rng, self.admission(trials))
+            if len(holes):
+                return holes[0]
         return rng.random(self._box.dimension) if self.region is None else self.region.draw(1, rng)[0]
 
     # --- inside -------------------------------------------------------------------------------------------------
@@ -262,10 +297,15 @@ class Requirements:
             return self._models[k].posterior(told)
         # Trials that all keep well within the limit show little of what the output may do elsewhere: until they show
         # more, it may differ by as much as the limit is away.
+        known = self._cautious.get(k)
+        if known is not None and known[0] == len(told):
+            return known[1]
         limit, y = self.limits[k], told.values
         away = min(abs(end - float(y.mean())) for end in (limit.lower, limit.upper) if np.isfinite(end))
         wide = (float(y.mean()) - 2.0 * away, float(y.mean()) + 2.0 * away) if away > 0.0 else None
-        return self._model(GaussianProcess(noise=self._noise, output_range=wide), k).posterior(told)
+        posterior = self._model(GaussianProcess(noise=self._noise, output_range=wide), k).posterior(told)
+        self._cautious[k] = (len(told), posterior)
+        return posterior
 
     def _model(self, surrogate: GaussianProcess, k: int) -> ResponseModel:
         return ResponseModel(
@@ -289,53 +329,3 @@ class Requirements:
         measured = told[np.isfinite(told).all(axis=1)]
         scale = np.ptp(measured, axis=0) if len(measured) else np.ones(told.shape[1])
         return (np.maximum(self._missed(told), 0.0) / np.where(scale > 0.0, scale, 1.0)).max(axis=1, initial=0.0)
-
-
-def required(
-    box: Box,
-    allowed: Any,
-    limits: tuple[Limit, ...],
-    *,
-    level: float,
-    safety: float | None,
-    ranking: Ranking,
-    straying: InputNoise | None,
-    lattice: Lattice | None,
-    seed: int,
-    first: NDArray[np.float64],
-    preset: str | None,
-) -> Requirements | None:
-    """Return what these settings of an `Optimizer` require, None for nothing; `first` (k, d) are tried first.
-
-    Raises InputError for values out of range, settings that contradict each other, and a region without an input.
-    """
-    rules = checked_rules(allowed)
-    for name, value in (("feasible", level), ("safety", safety)):
-        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < 1):
-            raise InputError(f"{name} is {value!r}; give a probability strictly between 0 and 1, such as 0.95.")
-    if safety is not None and (all(limit.watched for limit in limits) or not len(first)):
-        raise InputError(
-            "safety= needs constraints= with a limit, and initial_points= that are known to keep all limits."
-        )
-    if not rules and not limits:
-        return None
-    if preset is not None:
-        raise InputError(
-            f"preset='{preset}' chooses trials as the thesis does, which knows no constraints; leave one out."
-        )
-    region = Region(box, rules, lattice, seed, first) if rules else None
-    if region is not None and not region.contains(first).all():
-        bad = first[~region.contains(first)][0]
-        raise InputError(f"initial_points hold {box.as_dict(box.from_unit(bad))}, which is not allowed.")
-    return Requirements(
-        box,
-        region,
-        limits,
-        level=level,
-        safety=safety,
-        ranking=ranking,
-        straying=straying,
-        noise="inferred" if ranking.noisy and straying is None else "none",
-        lattice=lattice,
-        seed=seed,
-    )

@@ -34,6 +34,7 @@ def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], t
         "format": _FORMAT,
         "version": _VERSION,
         "box": {variable.name: list(variable.described) for variable in box.variables},
+        **({} if box.uncontrolled is None else {"uncontrolled": _conditions(box)}),
         "settings": {name: _plain(value) for name, value in settings.items()},
         "trials": [
             {
@@ -83,7 +84,9 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
     if data.get("version") != _VERSION:
         raise InputError(f"file {shown} has the format {data.get('version')!r}, this version reads {_VERSION}.")
     try:
-        box = Box(data["box"])
+        conditions = data.get("uncontrolled")
+        given_conditions = None if conditions is None else {tuple(conditions["names"]): conditions["samples"]}
+        box = Box(data["box"], uncontrolled=given_conditions)
         settings = {name: _restored(name, value) for name, value in {**data["settings"], **given}.items()}
         told, pending = data["trials"], data["pending"]
         limits = limits_of(settings.get("constraints"))
@@ -104,6 +107,15 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise InputError(f"file {shown} is damaged: {type(error).__name__}: {error}.") from None
     return box, settings, trials
+
+
+def _conditions(box: Box) -> dict[str, Any]:
+    """Return the samples of uncontrolled variables, in the box's units."""
+    held = box.uncontrolled
+    if held is None:
+        return {}
+    names = [name for name, taken in zip(box.names, held.held, strict=True) if taken]
+    return {"names": names, "samples": held.values.tolist()}
 
 
 def _plain(value: Any) -> Any:

@@ -3,7 +3,7 @@
 import importlib
 import importlib.util
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -24,7 +24,8 @@ class Function:
     Parameters
     ----------
     f
-        Called with one point (d,) float64 in the units of the box; returns a number. What it raises passes through.
+        Called with one point (d,) float64 in the units of the box; returns a number, or a number and a dictionary of
+        further outputs. What it raises passes through.
     box
         Named bounds of the d inputs.
     name
@@ -49,8 +50,14 @@ class Function:
         values = [self._value(point) for point in points]
         return values[0] if single else np.array(values)
 
+    def trial(self, x: NDArray[np.float64]) -> Any:
+        """Return whatever the function does at one x (d,): a number, or a number and {name: value} of more outputs."""
+        return self._f(x)
+
     def _value(self, point: NDArray[np.float64]) -> float:
         value = self._f(point.copy())
+        if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], Mapping):
+            value = value[0]
         try:
             if np.ndim(value) > 0 and np.size(value) != 1:
                 raise TypeError

@@ -74,6 +74,19 @@ def candidate(
     )
 
 
+def _of_constraints(result: Result) -> list[str]:
+    """Return in words whether the recommended input satisfies what was required besides a good value."""
+    best, trials = result.recommendation, result.optimizer.feasible
+    found = [best.infeasible[:1].upper() + best.infeasible[1:]] if best.infeasible else []
+    if best.outputs:
+        expected = ", ".join(f"{name} {outcome.mean:.4g}" for name, outcome in best.outputs.items())
+        found.append(
+            f"Expected of the recommended input besides: {expected}; {best.feasible:.1%} of executions keep all "
+            f"limits. {int(trials.sum())} of {len(trials)} trials are feasible."
+        )
+    return found
+
+
 def report_of(
     result: Result,
     candidates: Sequence[Candidate],
@@ -157,7 +170,7 @@ def report_of(
         warning=result.recommendation.warning,
         interrupted=result.interrupted,
         planned_trials=planned_trials,
-        notes=(*notes, *filter(None, [outliers_in_words(result.recommendation.outliers)])),
+        notes=(*notes, *_of_constraints(result), *filter(None, [outliers_in_words(result.recommendation.outliers)])),
         choices=choices or {},
         minimized=minimized,
     )

@@ -10,7 +10,7 @@
 Trials outside of the search space (other parameters, other ranges) are left out.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -19,10 +19,12 @@ from optuna.trial import FrozenTrial, TrialState
 
 from surehold.studies.search_space import SearchSpace
 
-__all__ = ["REACHED", "History", "history_of", "parameters_of"]
+__all__ = ["OUTPUTS", "REACHED", "History", "history_of", "parameters_of"]
 
 #: Trial attribute that holds the parameters that were truly reached.
 REACHED: Final = "surehold:reached"
+#: Trial attribute that holds the further outputs; an attribute of an output's own name does, too.
+OUTPUTS: Final = "surehold:outputs"
 
 
 class History(NamedTuple):
@@ -38,15 +40,26 @@ class History(NamedTuple):
     """inputs under way (p, d)"""
     numbers: NDArray[np.intp]
     """numbers of the told trials (t,)"""
+    outputs: NDArray[np.float64]
+    """further outputs (t, o); NaN where one was not measured"""
 
 
-def history_of(trials: Iterable[FrozenTrial], space: SearchSpace, number: int | None = None) -> History:
-    """Return what the trials say, the one with that number (the one being asked for) left out."""
+def history_of(
+    trials: Iterable[FrozenTrial],
+    space: SearchSpace,
+    number: int | None = None,
+    outputs: Sequence[str] = (),
+) -> History:
+    """Return what the trials say, the one with that number (the one being asked for) left out.
+
+    `outputs` are the names of further outputs.
+    """
     told: list[Mapping[str, Any]] = []
     reached: list[Mapping[str, Any]] = []
     pending: list[Mapping[str, Any]] = []
     values: list[float] = []
     numbers: list[int] = []
+    measured: list[list[float]] = []
     ordered = sorted(trials, key=lambda trial: trial.number)
     retried = {k for trial in ordered for k in trial.system_attrs.get("retry_history", ())}
     for trial in ordered:
@@ -64,13 +77,23 @@ def history_of(trials: Iterable[FrozenTrial], space: SearchSpace, number: int | 
         reached.append(actual if space.encodes(actual) else parameters)
         values.append(value if np.isfinite(value) else np.nan)
         numbers.append(trial.number)
+        attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
+        measured.append([_finite(attributes.get(name)) for name in outputs])
     return History(
         space.encode_all(told),
         np.array(values, dtype=np.float64),
         space.encode_all(reached, anywhere=True),
         space.encode_all(pending),
         np.array(numbers, dtype=np.intp),
+        np.array(measured, dtype=np.float64).reshape(len(numbers), len(outputs)),
     )
+
+
+def _finite(value: Any) -> float:
+    """Return a number; NaN of what is none."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        return np.nan
+    return float(value)
 
 
 def parameters_of(trial: FrozenTrial) -> dict[str, Any]:

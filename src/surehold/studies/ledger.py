@@ -12,7 +12,7 @@ from optuna.storages import BaseStorage
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from surehold.errors import InputError
-from surehold.studies.history import REACHED
+from surehold.studies.history import OUTPUTS, REACHED
 from surehold.studies.search_space import SearchSpace
 
 __all__ = [
@@ -138,7 +138,14 @@ class Ledger:
 
     # --- what came of it ------------------------------------------------------------------------------------------
 
-    def tell(self, id: int, value: Any, failed: bool, reached: Mapping[str, Any] | None) -> Told:
+    def tell(
+        self,
+        id: int,
+        value: Any,
+        failed: bool,
+        reached: Mapping[str, Any] | None,
+        outputs: Mapping[str, float] | None = None,
+    ) -> Told:
         """Store an answer; see `RobotStudy.tell`."""
         number = checked_value(value, failed)
         trial = self.trial(id)
@@ -150,6 +157,8 @@ class Ledger:
             try:
                 if actual is not None or REACHED in trial.user_attrs:  # left by a teller that died before its answer
                     self._backend.set_trial_user_attr(trial._trial_id, REACHED, actual or trial.params)
+                if outputs or OUTPUTS in trial.user_attrs:
+                    self._backend.set_trial_user_attr(trial._trial_id, OUTPUTS, dict(outputs or {}))
                 if number is None:
                     self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
                 else:
@@ -160,9 +169,11 @@ class Ledger:
         before = answer_of(trial)
         now = "failed" if number is None else f"value {number!r}"
         elsewhere = actual is not None and actual != trial.user_attrs.get(REACHED, trial.params)
-        if before != now or elsewhere:
+        otherwise = bool(outputs) and outputs != trial.user_attrs.get(OUTPUTS, {})
+        if before != now or elsewhere or otherwise:
+            differing = ", reached elsewhere" * elsewhere + ", with other outputs" * otherwise
             raise AnswerRefused(
-                f"trial {id} was told before: {before}; now: {now}{', reached elsewhere' * elsewhere}. The first "
+                f"trial {id} was told before: {before}; now: {now}{differing}. The first "
                 "answer counts; add the other one as a trial of its own if it was made."
             )
         return Told(id, state, number, True)

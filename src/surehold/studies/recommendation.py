@@ -4,7 +4,7 @@ Written as the study's attribute `surehold:recommendation` and as its note, whic
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -50,6 +50,12 @@ class StudyRecommendation:
     """numbers of the trials whose values are too far on the bad side of all others to be believed"""
     warning: str = ""
     """what is wrong with the model that all this rests on; empty where nothing is"""
+    feasible: float = 1.0
+    """probability that one execution keeps all limits of the further outputs"""
+    infeasible: str = ""
+    """why nothing feasible is known; empty where something is"""
+    outputs: dict[str, float] = field(default_factory=dict)
+    """what is expected of the further outputs, by name"""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -92,7 +98,7 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     sign = 1.0 if direction == "maximize" else -1.0
     trials = study.get_trials(deepcopy=False)
     space = sampler.search_space(study)
-    history = history_of(trials, space)
+    history = history_of(trials, space, outputs=sampler.outputs)
     with sampler.optimizing(space, history, direction) as optimizer:
         best = optimizer.recommend()
         told = np.flatnonzero(np.isfinite(history.y))
@@ -114,6 +120,9 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         best.refused if number != best_number else "",
         tuple(int(history.numbers[i]) for i in best.outliers),
         best.warning,
+        best.feasible,
+        best.infeasible,
+        {name: outcome.mean for name, outcome in best.outputs.items()},
     )
 
 
@@ -130,6 +139,11 @@ def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> 
         f"execution; 95 % of executions are better than {found.quantile:.4g}. It gave {found.observed:.4g} when it was "
         f"tried. {found.n} trials with a value.",
     ]
+    if found.outputs:
+        expected = ", ".join(f"{name} {_shown(value)}" for name, value in found.outputs.items())
+        lines += ["", f"Expected besides: {expected}; {found.feasible:.1%} of executions keep all limits."]
+    if found.infeasible:
+        lines += ["", found.infeasible[:1].upper() + found.infeasible[1:]]
     if found.refused:
         lines += ["", f"Not trial {found.best_trial}, the best observed one. {found.refused}"]
     if found.outliers:

@@ -25,7 +25,7 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
         If no trial has given a value yet.
     """
     stored = {trial.number: trial for trial in study.trials()}
-    history = history_of(stored.values(), study.settings.space)
+    history = history_of(stored.values(), study.settings.space, outputs=study.sampler.outputs)
     n = len(history.y)
     if not np.isfinite(history.y).any():
         raise InputError(f"study '{study.name}' has no trial with a value yet; there is nothing to show.")
@@ -34,7 +34,9 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
     optimizer = study.sampler.optimizer(study.study)
     recommendations: dict[int, Recommendation] = {}
     for count in sorted(replayed):
-        optimizer.restore(history.X[:count], history.y[:count], reached=history.reached[:count])
+        optimizer.restore(
+            history.X[:count], history.y[:count], reached=history.reached[:count], outputs=history.outputs[:count]
+        )
         recommendations[count] = optimizer.recommend()
     sign = 1.0 if study.settings.direction == "maximize" else -1.0
     best = sign * np.fmax.accumulate(sign * history.y)

@@ -16,7 +16,8 @@ from optuna.study import Study, StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError, SureholdError
-from surehold.studies.history import REACHED, history_of, parameters_of
+from surehold.optimization.limits import checked_outputs, limits_of
+from surehold.studies.history import OUTPUTS, REACHED, history_of, parameters_of
 from surehold.studies.ledger import HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
 from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend
 from surehold.studies.settings import SETTINGS, StudySettings
@@ -202,7 +203,13 @@ class RobotStudy:
     # --- telling --------------------------------------------------------------------------------------------------
 
     def tell(
-        self, id: int, value: Any = None, *, failed: bool = False, reached: Mapping[str, Any] | None = None
+        self,
+        id: int,
+        value: Any = None,
+        *,
+        failed: bool = False,
+        reached: Mapping[str, Any] | None = None,
+        constraints: Mapping[str, Any] | None = None,
     ) -> Told:
         """Take the answer to a trial: its value, or that it gave nothing.
 
@@ -216,6 +223,8 @@ class RobotStudy:
             Whether the trial gave nothing; then there is no value.
         reached
             The parameters that were truly reached, all of them or those that differ; they may lie outside the ranges.
+        constraints
+            Further outputs, as in `Optimizer.tell`.
 
         Raises
         ------
@@ -224,7 +233,12 @@ class RobotStudy:
             before. What was told before stays.
         """
         with self.storage.failures():
-            return self._ledger.tell(id, value, failed, reached)
+            return self._ledger.tell(id, value, failed, reached, self._checked(constraints, failed))
+
+    def _checked(self, constraints: Mapping[str, Any] | None, failed: bool) -> dict[str, float]:
+        limits = limits_of(self.settings.optimizer.get("constraints"))
+        values = checked_outputs(limits, constraints, failed)
+        return {limit.name: value for limit, value in zip(limits, values, strict=True) if np.isfinite(value)}
 
     def add(
         self,
@@ -233,6 +247,7 @@ class RobotStudy:
         *,
         failed: bool = False,
         reached: Mapping[str, Any] | None = None,
+        constraints: Mapping[str, Any] | None = None,
         note: str = "added by hand",
     ) -> int:
         """Store a trial that was made without being asked for, and return its id; arguments as in `tell`."""
@@ -241,6 +256,9 @@ class RobotStudy:
         marks: dict[str, Any] = {NOTE: note}
         if reached is not None:
             marks[REACHED] = self.settings.space.check_reached(commanded, reached)
+        outputs = self._checked(constraints, failed)
+        if outputs:
+            marks[OUTPUTS] = outputs
         state = TrialState.FAIL if failed else TrialState.COMPLETE
         with self.storage.failures(), self.storage.handing_out(self.name):
             return self._ledger.store(state, commanded, marks, number).number
@@ -323,7 +341,7 @@ class RobotStudy:
         return rule.reason(begun, now, [*promised, promise]), promise
 
     def _promise(self, trials: list[FrozenTrial]) -> float | None:
-        history = history_of(trials, self.settings.space)
+        history = history_of(trials, self.settings.space, outputs=self.sampler.outputs)
         if len(trials) < self.n_initial or not np.isfinite(history.y).any():
             return None
         with self.sampler.optimizing(self.settings.space, history, self.settings.direction) as optimizer:

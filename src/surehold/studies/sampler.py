@@ -23,6 +23,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.protocol import Surrogate
+from surehold.studies.allowed import allowed_in
 from surehold.studies.history import History, history_of
 from surehold.studies.search_space import SearchSpace
 
@@ -56,8 +57,10 @@ class Sampler(BaseSampler):
     warn_independent_sampling
         Whether to warn when a parameter is drawn at random because it is not in the search space.
     **settings
-        Of `Optimizer`: criterion, n_initial, design, noise, output_range, quadrature, k, border, kappa, risk, preset.
-        The chains of the thesis presets start anew for every suggestion.
+        Of `Optimizer`: criterion, n_initial, design, noise, output_range, quadrature, k, border, kappa, risk, preset,
+        allowed, constraints, feasible. A function `allowed` takes the parameters {name: value}. The further outputs of
+        a trial are its attributes of that name: `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets
+        start anew for every suggestion.
 
     The direction of the study decides whether values are maximized or minimized; several objectives are refused.
 
@@ -153,7 +156,7 @@ class Sampler(BaseSampler):
         space = space or self._known_space()
         if space.box is None:
             return space.complete({})
-        with self.optimizing(space, history_of(trials, space, number), direction) as optimizer:
+        with self.optimizing(space, history_of(trials, space, number, self.outputs), direction) as optimizer:
             return space.complete(optimizer.ask_trial(number=number).parameters)
 
     def optimizer(self, study: Study) -> Optimizer:
@@ -165,9 +168,11 @@ class Sampler(BaseSampler):
             If the study has several objectives, or no parameter can vary.
         """
         space = self.search_space(study)
-        history = history_of(study.get_trials(deepcopy=False), space)
+        history = history_of(study.get_trials(deepcopy=False), space, outputs=self.outputs)
         optimizer = self._new_optimizer(space, len(history.y), direction_of(study))
-        optimizer.restore(history.X, history.y, reached=history.reached, pending=history.pending)
+        optimizer.restore(
+            history.X, history.y, reached=history.reached, pending=history.pending, outputs=history.outputs
+        )
         return optimizer
 
     def search_space(self, study: Study) -> SearchSpace:
@@ -204,8 +209,15 @@ class Sampler(BaseSampler):
             if self._kept is None or self._kept[0] != key:
                 self._kept = (key, self._new_optimizer(space, len(history.y), direction))
             optimizer = self._kept[1]
-            optimizer.restore(history.X, history.y, reached=history.reached, pending=history.pending)
+            optimizer.restore(
+                history.X, history.y, reached=history.reached, pending=history.pending, outputs=history.outputs
+            )
             yield optimizer
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the further outputs, in the order of `constraints`."""
+        return tuple(self._settings.get("constraints") or ())
 
     def _known_space(self) -> SearchSpace:
         if self._space is None:
@@ -220,6 +232,7 @@ class Sampler(BaseSampler):
             raise InputError("every parameter can take one value only; there is nothing to optimize.")
         surrogate = self._surrogate_for(trials)
         settings: dict[str, Any] = {**self._settings, "n_initial": self.n_initial(space), "direction": direction}
+        settings["allowed"] = allowed_in(space, settings.get("allowed"))
         return Optimizer(space.box, input_noise=self._input_noise, surrogate=surrogate, **settings)
 
     def __getstate__(self) -> dict[str, Any]:

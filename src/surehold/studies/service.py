@@ -133,7 +133,9 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
     @app.post("/studies/{name}/tell", **protected)
     def tell(answer: wire.Answer) -> wire.Taken:
         """Take what came of a trial; the same answer twice is harmless."""
-        told = study.tell(answer.id, answer.value, failed=answer.failed, reached=answer.reached)
+        told = study.tell(
+            answer.id, answer.value, failed=answer.failed, reached=answer.reached, constraints=answer.constraints
+        )
         return wire.Taken(id=told.id, state=told.state, value=told.value, already=told.already)
 
     @app.get("/studies/{name}/recommendation", **protected)
@@ -155,7 +157,13 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
     @app.post("/studies/{name}/add", **protected)
     def add(addition: wire.Addition) -> wire.Added:
         """Add a trial that was made by hand."""
-        id = study.add(addition.parameters, addition.value, failed=addition.failed, reached=addition.reached)
+        id = study.add(
+            addition.parameters,
+            addition.value,
+            failed=addition.failed,
+            reached=addition.reached,
+            constraints=addition.constraints,
+        )
         return wire.Added(id=id)
 
     @app.post("/studies/{name}/veto", **protected)

@@ -31,6 +31,7 @@ _Id = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=2**31 - 1, descript
 _Value = Annotated[float | None, Field(allow_inf_nan=False, description="Outcome, larger is better.")]
 _Text = Annotated[str, Field(max_length=2000)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Outputs = Annotated[dict[str, _Finite | None] | None, Field(description="Further outputs by name.")]
 _Parameters = dict[str, int | _Finite | str | bool | None]
 
 
@@ -54,6 +55,7 @@ class Answer(_Request):
     value: _Value = None
     failed: bool = False
     reached: Annotated[_Parameters | None, Field(description="What was truly reached, where it differs.")] = None
+    constraints: _Outputs = None
 
 
 class Addition(_Request):
@@ -63,6 +65,7 @@ class Addition(_Request):
     value: _Value = None
     failed: bool = False
     reached: _Parameters | None = None
+    constraints: _Outputs = None
 
 
 class Veto(_Request):

@@ -137,6 +137,8 @@ def _noise_to_json(noise: InputNoise | None, space: SearchSpace) -> dict[str, An
             "input noise that differs from place to place is a function, which cannot be stored with a study; give "
             "standard deviations, half-widths or a covariance, or use surehold.Sampler directly."
         )
+    if "samples" in (stored := noise.to_json()):
+        return stored
     covariance = noise.unit_covariance(numbers)
     deviations = np.sqrt(np.diag(covariance)) * numbers.widths
     if np.array_equal(covariance, np.diag(np.diag(covariance))):
@@ -154,6 +156,8 @@ def _noise_from_json(data: Mapping[str, Any] | None) -> InputNoise | None:
         return None
     if "covariance" in data:
         return InputNoise(covariance=data["covariance"])
+    if "samples" in data:
+        return InputNoise.samples(data["samples"])
     if "half_widths" in data:
         return InputNoise.uniform(data["half_widths"])
     return InputNoise(data["standard_deviations"])

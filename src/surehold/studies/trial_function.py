@@ -20,6 +20,8 @@ class Outcome(NamedTuple):
     """NaN where it failed"""
     failure: str
     """why it failed, empty where it did not"""
+    outputs: Mapping[str, Any] = {}
+    """further outputs"""
 
 
 def trial_function(f: Callable[[Any], Any], space: SearchSpace) -> Callable[[Mapping[str, Any]], Outcome]:

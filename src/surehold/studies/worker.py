@@ -111,7 +111,10 @@ def _tell(study: RobotStudy, id: int, outcome: Outcome) -> None:
     value = None if failed else outcome.value
     said = "failed" if failed else f"value {value!r}"
     try:
-        _patiently(lambda: study.tell(id, value, failed=failed), f"trial {id} ({said}) could not be stored")
+        _patiently(
+            lambda: study.tell(id, value, failed=failed, constraints=dict(outcome.outputs) or None),
+            f"trial {id} ({said}) could not be stored",
+        )
     except StorageFailure:
         raise
     except InputError as error:  # another worker had taken the trial up, and was quicker

@@ -43,5 +43,6 @@ def where_to_look(
     total = variance_f + posterior.noise_variance(points).mean(axis=0)
     share = np.divide(covariance, np.sqrt(total), out=np.zeros_like(total), where=total > 0.0)
     gain = np.mean(share**2, axis=0)
-    gain[0] *= AT_THE_PLACE
+    if perturbations.held is None:  # the candidate's own values of uncontrolled variables mean nothing
+        gain[0] *= AT_THE_PLACE
     return points[np.argsort(-gain, kind="stable")]

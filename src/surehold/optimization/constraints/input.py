@@ -18,7 +18,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.constraints.linear import Linear
 from surehold.optimization.lattice import Lattice
 
-__all__ = ["Region", "Rule", "checked_rules"]
+__all__ = ["Region", "Rule", "checked_rules", "region_of"]
 
 Rule = Linear | Callable[[NDArray[np.float64]], Any]
 
@@ -45,6 +45,23 @@ def checked_rules(allowed: Any) -> tuple[Rule, ...]:
                 "function of x (d,) that returns True or False, or a list of these."
             )
     return tuple(rules)
+
+
+def region_of(
+    box: Box, allowed: Any, lattice: Lattice | None, seed: int, first: NDArray[np.float64]
+) -> "Region | None":
+    """Return the region of `Optimizer(allowed=)`, None for all of the box; `first` (k, d) must lie in it.
+
+    Raises InputError as `checked_rules` and `Region` do, and where one of the first points is not allowed.
+    """
+    rules = checked_rules(allowed)
+    if not rules:
+        return None
+    region = Region(box, rules, lattice, seed, first)
+    if not region.contains(first).all():
+        bad = first[~region.contains(first)][0]
+        raise InputError(f"initial_points hold {box.as_dict(box.from_unit(bad))}, which is not allowed.")
+    return region
 
 
 class Region:
@@ -169,9 +186,9 @@ class Region:
 
         d = self._box.dimension
         found = [known[self.contains(known)]] if len(known) else []
-        centers = self._centers()
-        if len(centers):
-            found.append(centers[self.contains(centers)])
+        inside = self._inside_linear(rng)
+        if len(inside):
+            found.append(inside[self.contains(inside)])
         sequence = qmc.Sobol(d, rng=rng)
         tested, most = 0, REGION_SEARCH_CALLS if self._functions else REGION_SEARCH
         while tested < most and sum(map(len, found)) < REGION_KNOWN:
@@ -180,7 +197,7 @@ class Region:
             tested += 1024
         points = np.concatenate(found) if found else np.empty((0, d))
         if not len(points):
-            points = self._from_linear(centers, rng)
+            points = self._from_linear(inside, rng)
         if not len(points):
             raise InputError(
                 f"no allowed input was found among {tested:,} points of {self._box}{self._rules()}; if there is one, "
@@ -188,38 +205,44 @@ class Region:
             )
         return points[:REGION_KNOWN]
 
-    def _centers(self) -> NDArray[np.float64]:
-        """Return the center of the largest ball within the linear constraints and the cube, (1, d); (0, d) for none.
+    def _inside_linear(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return points (k, d) within the linear constraints and the cube, the center of their largest ball first.
 
-        Raises InputError where they contradict each other.
+        The others are random means of their farthest points in some directions, so that walks begin everywhere even in
+        a strip. (0, d) without linear constraints; raises InputError where they contradict each other.
         """
         from scipy.optimize import linprog
 
         c, d = self._A.shape
         if c == 0:
             return np.empty((0, d))
-        norm = np.linalg.norm(self._A, axis=1, keepdims=True)
-        one_sided = [(self._A, norm, self._high), (-self._A, norm, -self._low)]
-        walls = [(np.eye(d), np.ones((d, 1)), np.ones(d)), (-np.eye(d), np.ones((d, 1)), np.zeros(d))]
-        A = np.concatenate([np.hstack([a, r]) for a, r, _ in [*one_sided, *walls]])
-        b = np.concatenate([limit for *_, limit in [*one_sided, *walls]])
-        finite = np.isfinite(b)
-        solved = linprog(np.append(np.zeros(d), -1.0), A[finite], b[finite], bounds=[(0.0, 1.0)] * d + [(0.0, None)])
+        A, b = np.concatenate([self._A, -self._A]), np.concatenate([self._high, -self._low])
+        A, b = A[np.isfinite(b)], b[np.isfinite(b)]
+        walls = np.concatenate([np.eye(d), -np.eye(d)])
+        ball = np.hstack([np.concatenate([A, walls]), np.ones((len(A) + 2 * d, 1))])
+        ball[: len(A), -1] = np.linalg.norm(A, axis=1)
+        room = np.concatenate([b, np.ones(d), np.zeros(d)])
+        bounds: list[tuple[float, float | None]] = [(0.0, 1.0)] * d
+        solved = linprog(np.append(np.zeros(d), -1.0), ball, room, bounds=[*bounds, (0.0, None)])
         if solved.x is None:
             raise InputError(
                 f"no input of {self._box} is allowed{self._rules()}: the linear constraints contradict it."
             )
-        return solved.x[None, :d]
+        center = solved.x[:d]
+        directions = np.concatenate([walls, rng.standard_normal((2 * d, d))])
+        ends = np.array([linprog(direction, A, b, bounds=bounds).x for direction in directions])
+        means = rng.dirichlet(np.full(len(ends), 0.3), 64) @ ends
+        return np.concatenate([center[None], 0.5 * (means + center), means])
 
-    def _from_linear(self, centers: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    def _from_linear(self, inside: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
         """Return allowed points met on walks within the linear constraints, where the functions refused all others."""
-        if not len(centers) or not self._functions:
+        if not len(inside) or not self._functions:
             return np.empty((0, self._box.dimension))
-        walkers = np.repeat(centers, 64, axis=0)
+        walkers = inside
         linear = object.__new__(Region)
         vars(linear).update(vars(self) | {"_functions": ()})
         found = []
-        for _ in range(REGION_SEARCH_CALLS // (8 * 64)):
+        for _ in range(REGION_SEARCH_CALLS // (4 * len(inside))):
             walkers = linear._step(walkers, rng)
             found.append(walkers[self.contains(walkers)])
         return np.concatenate(found)

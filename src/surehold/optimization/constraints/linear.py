@@ -16,7 +16,7 @@ from surehold.errors import InputError, unknown_name
 __all__ = ["Linear"]
 
 _NUMBER: Final = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_TERM: Final = re.compile(rf"\s*([+-]?)\s*(?:({_NUMBER})\s*\*?\s*)?([^\W\d][\w.\-]*)?\s*")
+_TERM: Final = re.compile(rf"\s*([+-]?)\s*(?:({_NUMBER})\s*\*?\s*)?([^\W\d][\w.]*)?\s*")
 _SIDES: Final = re.compile(r"(<=|>=|<|>|=+)")
 _FORM: Final = "write for example 'a + 2*b <= 3', or '0 <= a - b <= 1'"
 

@@ -87,18 +87,24 @@ class Within:
 
 
 def execution_probability(
-    outputs: Sequence[tuple[Posterior, Limit]], perturbations: Perturbations, U: NDArray[np.float64]
+    outputs: Sequence[tuple[Posterior, Limit]],
+    perturbations: Perturbations,
+    U: NDArray[np.float64],
+    *,
+    cautious: bool = False,
 ) -> NDArray[np.float64]:
     """Return the probability (q,) that one execution at U (q, d) keeps every output within its limits.
 
     Over the input noise and what the models do not know; given where the execution is, outputs count as independent.
+    `cautious`: by the particle of each model that sees least chance, in place of their mean.
     """
     together = np.ones((len(U), len(perturbations.quadrature.weights)))
     for posterior, limit in outputs:
         moments, _ = perturbations.spread(posterior, U)  # (m, q s)
         sigma = np.sqrt(np.maximum(moments.variance, 1e-290))
         a, b = (limit.lower - moments.mean) / sigma, (limit.upper - moments.mean) / sigma
-        together *= interval(a, b).mean(axis=0).reshape(together.shape)
+        kept = interval(a, b)  # (m, q s)
+        together *= (kept.min(axis=0) if cautious else kept.mean(axis=0)).reshape(together.shape)
     return together @ perturbations.quadrature.weights
 
 

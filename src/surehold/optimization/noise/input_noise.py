@@ -18,6 +18,7 @@ from surehold.optimization.noise.gaussian import (
     checked_deviations,
 )
 from surehold.optimization.noise.kinds import Kind, root_of
+from surehold.optimization.noise.samples import Samples, checked_samples
 from surehold.optimization.noise.uniform import Uniform
 from surehold.optimization.noise.varying import Varying
 
@@ -29,7 +30,8 @@ _NO_NOISE: Final = "input noise of 0 in every variable is no noise; pass input_n
 class InputNoise:
     """Input noise: reached = commanded + N(0, covariance).
 
-    `InputNoise.uniform` is bounded noise, `InputNoise.varying` noise that differs from place to place.
+    `InputNoise.uniform` is bounded noise, `InputNoise.varying` noise that differs from place to place,
+    `InputNoise.samples` noise of any distribution, by measured errors.
 
     Parameters
     ----------
@@ -108,6 +110,21 @@ class InputNoise:
         return cls._of(Varying(function))
 
     @classmethod
+    def samples(cls, errors: ArrayLike) -> "InputNoise":
+        """Return noise of any distribution, given as errors (N, d) that were measured: reached - commanded.
+
+        In the box's units and the order of its names; (N,) for one variable. They may be skewed, have several modes,
+        and a mean: as a rig that always falls short would make them. Every error is equally likely. Raises InputError
+        where they are no finite numbers, fewer than two, or all equal.
+
+        Examples
+        --------
+        >>> InputNoise.samples([0.0, 0.0, 0.0, -0.004]).unit_covariance(Box({"dx": (-0.05, 0.05)})).round(6)
+        array([[0.0003]])
+        """
+        return cls._of(Samples(checked_samples(errors)))
+
+    @classmethod
     def unit(cls, standard_deviation: float) -> "InputNoise":
         """Return noise of the same `standard_deviation` in every variable, as a fraction of the box (0.03 = 3 %)."""
         value = checked_deviation("every variable", standard_deviation)
@@ -134,6 +151,8 @@ class InputNoise:
             return {"unit": kind.deviation}
         if isinstance(kind, Correlated):
             return {"covariance": kind.covariance.tolist()}
+        if isinstance(kind, Samples):
+            return {"samples": kind.errors.tolist()}
         raise InputError(f"{self!r} is a function, which plain data cannot hold; give constant noise.")
 
     @classmethod
@@ -141,6 +160,8 @@ class InputNoise:
         """Return the noise that `to_json` described."""
         if "unit" in data:
             return cls.unit(data["unit"])
+        if "samples" in data:
+            return cls.samples(data["samples"])
         if data.get("bounded"):
             return cls._of(Uniform(_some(checked_deviations(data["standard_deviations"]))))
         return cls(data.get("standard_deviations"), covariance=data.get("covariance"))

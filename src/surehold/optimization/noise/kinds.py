@@ -1,4 +1,4 @@
-"""What every kind of input noise answers; `gaussian`, `uniform` and `varying` hold the kinds.
+"""What every kind of input noise answers; `gaussian`, `uniform`, `varying` and `samples` hold the kinds.
 
 Legend: d variables, box units as in `Box`; S covariance of the noise in the unit cube, (d, d).
 """

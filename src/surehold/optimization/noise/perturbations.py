@@ -7,24 +7,30 @@ Legend
     g(x)     outcome under the input noise, E f(x + noise), about sum_i w_i f(x + xi_i)      [UO, thesis (3.21)]
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import QUASI_RANDOM_EXPONENT
+from surehold.defaults import COARSE_CONDITIONS, QUASI_RANDOM_EXPONENT
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.kinds import Root
 from surehold.optimization.noise.quadratures import QUADRATURES, Quadrature, exact, quadrature
+from surehold.optimization.noise.samples import representatives
 from surehold.optimization.surrogates.gaussian_process.closed_form import closed_form
 from surehold.optimization.surrogates.protocol import Moments, Posterior
+from surehold.optimization.uncontrolled import Conditions
 
-__all__ = ["BORDERS", "Perturbations"]
+__all__ = ["BORDERS", "Allowed", "Perturbations"]
 
 BORDERS: Final = ("extend", "clip", "keep")
+_BISECTED: Final = 1e-3  # of a perturbation: how near to the border of what is allowed it is drawn back
+
+Allowed = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,8 @@ class Perturbations:
     """Weighted perturbations of an input, and what happens to those that leave the box.
 
     The rule at the border: "extend" lets the model be evaluated outside the box; "clip" moves a coordinate that left
-    back to the border; "keep" gives it its noise-free value, as the thesis scores its runs.
+    back to the border; "keep" gives it its noise-free value, as the thesis scores its runs. Where not all of the box is
+    `allowed`, "clip" draws the whole point back towards the commanded one, and "keep" gives it that one.
     """
 
     quadrature: Quadrature
@@ -42,6 +49,10 @@ class Perturbations:
     """for noise that varies: points (q, d) -> roots of the covariances there, (q, d, d)"""
     covariance: NDArray[np.float64] | None = None
     """(d, d) where outcomes are computed in closed form; the quadrature then serves everything else"""
+    held: NDArray[np.bool_] | None = None
+    """uncontrolled variables (d,): their "offsets" are the values that they take, whatever the query's"""
+    allowed: Allowed | None = None
+    """tells which points (k, d) of the cube may be commanded; the border rules "clip" and "keep" hold there, too"""
 
     def __post_init__(self) -> None:
         if self.border not in BORDERS:
@@ -57,6 +68,7 @@ class Perturbations:
         *,
         k: float = 1.0,
         exponent: int = QUASI_RANDOM_EXPONENT,
+        allowed: Allowed | None = None,
     ) -> "Perturbations":
         """Return the perturbations of an input noise by a quadrature rule; None is no noise.
 
@@ -67,6 +79,21 @@ class Perturbations:
         """
         if rule not in (*QUADRATURES, "closed_form"):
             raise unknown_name("quadrature", rule, (*QUADRATURES, "closed_form"))
+        allowed = None if border == "extend" else allowed
+        if box.uncontrolled is not None:
+            if rule == "closed_form":
+                raise InputError("the quadrature 'closed_form' knows no uncontrolled variables; choose another one.")
+            points, root = (
+                (exact(box.dimension), None) if noise is None else noise.kind.quadrature(box, rule, k, exponent)
+            )
+            return cls(
+                under_conditions(points, box.uncontrolled, rule, exponent),
+                border,
+                root,
+                None,
+                box.uncontrolled.held,
+                allowed,
+            )
         if noise is None:
             return cls(exact(box.dimension), border)
         if rule == "closed_form":
@@ -78,12 +105,17 @@ class Perturbations:
             covariance = noise.unit_covariance(box)
             return cls(quadrature("quasi_monte_carlo", covariance), border, None, covariance)
         points, root = noise.kind.quadrature(box, rule, k, exponent)
-        return cls(points, border, root)
+        return cls(points, border, root, allowed=allowed)
 
     def around(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the perturbed points (q, s, d) of U (q, d)."""
         offsets, _ = self._at(U)
         return U[:, None, :] + offsets
+
+    def with_slopes(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """Return the perturbed points (q, s, d), and their derivatives by the query's coordinates (None: 1)."""
+        offsets, slopes = self._at(U)
+        return U[:, None, :] + offsets, slopes
 
     def outcome(self, posterior: Posterior, U: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of g at U (q, d) under each particle."""
@@ -105,12 +137,55 @@ class Perturbations:
         offsets = self.quadrature.offsets
         if self.root is not None:
             offsets = np.einsum("qde,se->qsd", self.root(U), offsets)
+        free = None
+        if self.held is not None:
+            offsets = np.where(self.held, self.quadrature.offsets - U[:, None, :], offsets)
+            free = np.broadcast_to(np.where(self.held, 0.0, 1.0), offsets.shape)
         if self.border == "extend":
-            return offsets, None
+            return offsets, free
         points = U[:, None, :] + offsets
         inside = (points >= 0.0) & (points <= 1.0)
+        if self.allowed is not None:
+            return self._drawn_back(U, np.where(inside, offsets, 0.0) if self.border == "keep" else offsets), free
         if inside.all():
-            return offsets, None
+            return offsets, free
         if self.border == "keep":
-            return np.where(inside, offsets, 0.0), None
-        return np.clip(points, 0.0, 1.0) - U[:, None, :], inside.astype(np.float64)
+            return np.where(inside, offsets, 0.0), free
+        slopes = inside.astype(np.float64)
+        return np.clip(points, 0.0, 1.0) - U[:, None, :], slopes if free is None else slopes * free
+
+    def _drawn_back(self, U: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return offsets (q, s, d) whose points are allowed: "keep": none; "clip": on the way there, by bisection."""
+        points = np.clip(U[:, None, :] + offsets, 0.0, 1.0)
+        offsets = (points - U[:, None, :]).reshape(-1, U.shape[1])
+        start = np.repeat(U, points.shape[1], axis=0)
+        good = np.ones(len(start), dtype=bool) if self.allowed is None else self.allowed(start + offsets)
+        share = good.astype(np.float64)
+        if self.border == "clip" and self.allowed is not None:
+            bad, step = np.flatnonzero(~good), 0.5
+            while step > _BISECTED:
+                further = share[bad] + step
+                share[bad] = np.where(self.allowed(start[bad] + further[:, None] * offsets[bad]), further, share[bad])
+                step *= 0.5
+        return (share[:, None] * offsets).reshape(points.shape)
+
+
+def under_conditions(points: Quadrature, conditions: Conditions, rule: str, exponent: int) -> Quadrature:
+    """Return a quadrature of the input noise with the values of uncontrolled variables in their columns.
+
+    Quasi-random points are paired with as many representative conditions, in a fixed random order; the few points of
+    the other rules are combined with each of 8.
+    """
+    paired = rule == "quasi_monte_carlo" and len(points.weights) > 1
+    count = 2**exponent if rule == "quasi_monte_carlo" else COARSE_CONDITIONS
+    taken = representatives(conditions.samples, count)
+    s, c = len(points.weights), len(taken.weights)
+    if paired:
+        rows = np.random.default_rng(0).permutation(np.arange(s) % c)
+        noise = points.offsets.copy()
+        weights = points.weights * (taken.weights / np.bincount(rows, points.weights, c))[rows]
+    else:
+        rows = np.tile(np.arange(c), s)
+        noise, weights = np.repeat(points.offsets, c, axis=0), np.repeat(points.weights, c) * taken.weights[rows]
+    noise[:, conditions.held] = taken.offsets[rows]
+    return Quadrature(noise, weights / weights.sum())

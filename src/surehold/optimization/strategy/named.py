@@ -7,7 +7,7 @@ from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.acquisition.scales import criterion_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.noise.perturbations import Allowed, Perturbations
 from surehold.optimization.strategy.covering import Covering
 from surehold.optimization.strategy.expected_improvement import ExpectedImprovement
 from surehold.optimization.strategy.protocol import Strategy
@@ -33,6 +33,7 @@ def strategy_named(
     noisy: bool,
     trust_region: TrustRegion | None,
     thesis: ThesisConstants | None,
+    allowed: Allowed | None = None,
 ) -> Strategy:
     """Return the strategy of these settings, as of `Optimizer`; `noisy`: whether observations carry noise.
 
@@ -41,20 +42,26 @@ def strategy_named(
     InputError
         For an unknown name, a value out of range, or settings that contradict each other.
     """
+    shaken = input_noise is not None or box.uncontrolled is not None
     if criterion is None:
-        criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + (input_noise is not None)]
+        criterion = ("log_ei", "robust_log_ei", "ei", "uei")[2 * (thesis is not None) + shaken]
     name = criterion_name(criterion)
     if not np.isfinite(kappa):
         raise InputError(f"kappa is {kappa!r}; give a finite number of standard deviations.")
     averse = risk.name != "mean"
-    if input_noise is None and (name.scale != "exact" or averse):
+    if box.uncontrolled is not None and (thesis is not None or (name.scale == "exact" and not averse)):
+        raise InputError(
+            "some variables are uncontrolled: what counts is the outcome over them, so that a criterion of it is "
+            "needed, such as 'robust_log_ei' (the default), and no thesis preset."
+        )
+    if not shaken and (name.scale != "exact" or averse):
         what = f"risk '{risk.name}'" if averse else f"criterion '{criterion}'"
         raise InputError(f"{what} needs input noise; give input_noise=.")
     default = "quasi_monte_carlo" if name.scale == "robust" or averse else "unscented"
     rule = default if quadrature is None else quadrature
-    accurate = Perturbations.of(input_noise, box, rule, border, k=k)
+    accurate = Perturbations.of(input_noise, box, rule, border, k=k, allowed=allowed)
     risk.check_weights(accurate.quadrature.weights, rule)
-    coarse = Perturbations.of(input_noise, box, "unscented", border)
+    coarse = Perturbations.of(input_noise, box, "unscented", border, allowed=allowed)
     ranking = Ranking(accurate, coarse, risk, noisy, screened=thesis is None)
     if thesis is not None:
         for setting, given in (

@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+from scipy.optimize import check_grad, minimize
+from scipy.special import log_ndtr, ndtr
+
+from surehold.optimization.box import Box
+from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel, laplace
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.optimizer import Optimizer
+
+RNG = np.random.default_rng(0)
+X = RNG.random((24, 2))
+OK = X[:, 0] + 0.4 * X[:, 1] < 0.8
+
+
+def covariance(A, B, length=0.4, s2=6.0):
+    r = 5.0**0.5 * np.linalg.norm(A[:, None] - B, axis=2) / length
+    return s2 * (1.0 + r + r * r / 3.0) * np.exp(-r) + 1.0
+
+
+def test_the_mode_against_scipy():
+    K, t = covariance(X, X), np.where(OK, 1.0, -1.0)
+    mode = laplace(K, t)
+    inverse = np.linalg.inv(K)
+    found = minimize(lambda f: 0.5 * f @ inverse @ f - log_ndtr(t * f).sum(), np.zeros(24), tol=1e-10)
+    assert K @ mode.a == pytest.approx(found.x, abs=1e-3)
+    # evidence by the determinant itself: -f'K^-1 f/2 + log p(t|f) - log det(I + W K)/2
+    assert mode.log_evidence == pytest.approx(
+        -found.fun - 0.5 * np.linalg.slogdet(np.eye(24) + mode.root_w[:, None] ** 2 * K)[1], abs=1e-5
+    )
+
+
+def test_probability_against_sampling_the_exact_posterior():
+    # One setting, six labels: importance sampling from the prior is exact; Laplace's error is known to be small.
+    points, ok = X[:6], OK[:6]
+    t = np.where(ok, 1.0, -1.0)
+    U = np.array([[0.2, 0.3], [0.9, 0.8], [0.5, 0.5]])
+    joint = covariance(np.concatenate([points, U]), np.concatenate([points, U]), s2=1.0)
+    f = np.random.default_rng(1).multivariate_normal(np.zeros(9), joint, 400_000)
+    weights = np.exp(log_ndtr(t * f[:, :6]).sum(axis=1))
+    expected = (weights[:, None] * ndtr(f[:, 6:])).sum(axis=0) / weights.sum()
+    mode = laplace(joint[:6, :6], t)
+    k = joint[6:, :6]
+    v = 2.0 - np.einsum("qi,ij,qj->q", k, np.linalg.inv(joint[:6, :6] + np.diag(mode.root_w**-2.0)), k)
+    assert ndtr(k @ mode.a / np.sqrt(1.0 + v)) == pytest.approx(expected, abs=0.03)  # Laplace: 0.024 off
+
+
+def test_gradients_by_differences():
+    model = SuccessModel(X, OK)
+    for u in RNG.random((5, 2)):
+        assert (
+            check_grad(lambda v: model.probability(v[None])[0][0], lambda v: model.probability(v[None], True)[1][0], u)
+            < 1e-5
+        )
+    noisy = Succeeds(model, Perturbations.of(InputNoise.unit(0.1), Box.unit(2), "unscented", "clip"))
+    for u in RNG.random((5, 2)):
+        error = check_grad(
+            lambda v: noisy.log_probability(v[None])[0][0], lambda v: noisy.log_probability(v[None], True)[1][0], u
+        )
+        assert error < 1e-4
+
+
+def test_what_is_said_to_be_likely_is_so_at_least_as_often():
+    # Labels of 15 places by a random line: near 0 and 1 the model is careful (it says 0.17 too little), never bold.
+    said, is_so = [], []
+    for seed in range(20):
+        rng = np.random.default_rng([3, seed])
+        normal, place = rng.standard_normal(2), rng.uniform(0.3, 0.7, 2)
+        points, U = rng.random((15, 2)), rng.random((200, 2))
+        said.append(SuccessModel(points, (points - place) @ normal > 0.0).probability(U)[0])
+        is_so.append((U - place) @ normal > 0.0)
+    p, true = np.concatenate(said), np.concatenate(is_so)
+    low, high = p < 0.3, p > 0.7
+    assert min(low.sum(), high.sum()) > 200
+    assert true[low].mean() < p[low].mean() + 0.02
+    assert true[high].mean() > p[high].mean() - 0.02
+    assert true[~low & ~high].mean() == pytest.approx(0.5, abs=0.2)
+
+
+def run(n, seed, fails, **settings):
+    optimizer = Optimizer(Box.unit(2), seed=seed, failures="modelled", **settings)
+    for _ in range(n):
+        x = optimizer.ask()
+        bad = bool(fails(x))
+        optimizer.tell(x, None if bad else -((x[0] - 0.6) ** 2) - (x[1] - 0.5) ** 2, failed=bad)
+    return optimizer
+
+
+def test_a_failed_region_is_left_alone_and_the_optimum_found():
+    optimizer = run(28, 0, lambda x: np.hypot(x[0] - 0.75, x[1] - 0.5) < 0.13)
+    assert optimizer.recommend().observed > -1e-3
+    assert np.isnan(optimizer.y[10:]).sum() <= 7
+
+
+def test_without_failures_nothing_changes():
+    plain = Optimizer(Box.unit(2), seed=4)
+    modelled = Optimizer(Box.unit(2), seed=4, failures="modelled")
+    for _ in range(13):
+        x = plain.ask()
+        assert np.array_equal(modelled.ask(), x)
+        plain.tell(x, float(x[0]))
+        modelled.tell(x, float(x[0]))
+
+
+def test_where_every_trial_failed_new_places_are_tried():
+    optimizer = run(16, 1, lambda x: True, n_initial=6)
+    U = np.asarray(optimizer.X)
+    assert np.linalg.norm(U[:, None] - U, axis=2)[np.triu_indices(16, 1)].min() > 0.08
+
+
+def test_under_noise_the_answer_keeps_away_from_the_edge():
+    # The value rises up to an edge at x1 = 0.7, beyond which executions fail.
+    optimizer = Optimizer(Box.unit(2), seed=0, failures="modelled", input_noise=InputNoise.unit(0.04))
+    for _ in range(24):
+        x = optimizer.ask()
+        bad = x[0] > 0.7
+        optimizer.tell(x, None if bad else float(x[0] - 0.2 * x[1]), failed=bool(bad))
+    assert optimizer.recommend().x[0] < 0.68

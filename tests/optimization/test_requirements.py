@@ -1,0 +1,218 @@
+import numpy as np
+import pytest
+
+from surehold.errors import InputError, SureholdError
+from surehold.optimization.box import Box
+from surehold.optimization.constraints.linear import Linear
+from surehold.optimization.maximization import minimize
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.optimizer import Optimizer
+
+BOX = Box.unit(2)
+
+
+def gramacy(x):
+    # Gramacy et al. 2016: minimize x1 + x2; the optimum 0.5998 is at (0.1954, 0.4044).
+    return 1.5 - x[0] - 2.0 * x[1] - 0.5 * np.sin(2.0 * np.pi * (x[0] ** 2 - 2.0 * x[1]))
+
+
+def run(n, f, c, limit=(None, 0.0), **settings):
+    optimizer = Optimizer(BOX, direction="minimize", constraints={"c": limit}, **settings)
+    for _ in range(n):
+        x = optimizer.ask()
+        optimizer.tell(x, f(x), constraints={"c": c(x)})
+    return optimizer
+
+
+def test_the_constrained_optimum_is_found():
+    optimizer = run(32, lambda x: x.sum(), gramacy, seed=0)
+    best = optimizer.recommend()
+    assert gramacy(best.x) <= 0.0
+    assert best.x.sum() == pytest.approx(0.5998, abs=2e-3)
+    assert best.feasible == 1.0
+    assert best.infeasible == ""
+    assert "lowest observed trial gave" in best.refused
+    assert "missed c by" in best.refused
+    assert best.outputs["c"].mean == pytest.approx(gramacy(best.x), abs=1e-3)
+    assert optimizer.feasible.sum() == np.sum([gramacy(x) <= 0.0 for x in optimizer.X])
+
+
+def test_both_limits_hold():
+    optimizer = run(25, lambda x: x.sum(), lambda x: 2.0 * x[0] - x[1], (0.5, 0.6), seed=1)
+    best = optimizer.recommend()
+    assert 0.5 <= 2.0 * best.x[0] - best.x[1] <= 0.6
+    assert best.x.sum() == pytest.approx(0.25, abs=5e-3)  # x2 = 0, 2 x1 = 0.5
+
+
+def test_an_island_is_sought_first_and_found():
+    # Feasible is a disc of 1.8 % of the box; designs of 10 points miss it mostly.
+    def c(x):
+        return (x[0] - 0.72) ** 2 + (x[1] - 0.31) ** 2 - 0.0057
+
+    found = [run(22, lambda x: x[0], c, seed=seed).recommend() for seed in range(3)]
+    assert all(c(best.x) <= 0.0 for best in found)
+    assert all(best.x[0] < 0.66 for best in found)  # 0.6445 at best
+
+
+def test_what_cannot_be_satisfied_is_said():
+    optimizer = run(12, lambda x: x[0], lambda x: 3.3 + x[1], (None, 3.0), seed=0)
+    best = optimizer.recommend()
+    assert best.infeasible == "no feasible trial in 12; the nearest missed c by 0.3."
+    assert best.x[1] == pytest.approx(0.0, abs=1e-6)
+    assert best.feasible == 0.0
+    assert not optimizer.feasible.any()
+    assert optimizer.recommend("box").infeasible == best.infeasible
+
+
+def test_under_noise_the_stated_share_of_executions_is_feasible():
+    noise = InputNoise.unit(0.04)
+    optimizer = run(30, lambda x: x.sum(), lambda x: 1.0 - x[0] - 2.0 * x[1], seed=0, input_noise=noise)
+    rng = np.random.default_rng(5)
+    for best in (optimizer.recommend(), optimizer.recommend("box")):
+        reached = best.x + 0.04 * rng.standard_normal((20_000, 2))
+        share = np.mean(1.0 - reached[:, 0] - 2.0 * reached[:, 1] <= 0.0)
+        assert share > 0.945
+        assert best.feasible == pytest.approx(share, abs=0.01)
+    # what is left of the best possible: x1 = 0, 2 x2 = 1 + 1.645 * 0.04 * sqrt(5)
+    possible = 0.5 * (1.0 + 1.645 * 0.04 * 5.0**0.5)
+    assert optimizer.recommend("box").mean == pytest.approx(possible, abs=0.02)
+
+
+def test_a_lower_share_is_a_better_value():
+    noise = InputNoise.unit(0.04)
+    bold = run(20, lambda x: x.sum(), lambda x: 1.0 - x[0] - 2.0 * x[1], seed=0, input_noise=noise, feasible=0.6)
+    careful = run(20, lambda x: x.sum(), lambda x: 1.0 - x[0] - 2.0 * x[1], seed=0, input_noise=noise, feasible=0.99)
+    assert bold.recommend("box").mean < careful.recommend("box").mean - 0.05
+
+
+def test_safe_mode_stays_within_the_limit_and_still_improves():
+    def c(x):
+        return (x[0] - 0.3) ** 2 + (x[1] - 0.3) ** 2
+
+    broken = 0
+    for seed in range(3):
+        optimizer = run(
+            16,
+            lambda x: -np.sin(5.0 * x[0]) - x[1],
+            c,
+            (None, 0.1),
+            seed=seed,
+            safety=0.95,
+            initial_points=[[0.3, 0.3], [0.25, 0.35]],
+        )
+        broken += sum(c(x) > 0.1 for x in optimizer.X)
+        assert optimizer.recommend().observed < -1.55  # -1.616 is possible (SciPy's SLSQP)
+    assert broken <= 3  # of 42; over 16 runs of two problems it was 10 of 320
+
+
+def test_safe_mode_needs_a_safe_beginning():
+    with pytest.raises(InputError, match="needs constraints= with a limit, and initial_points="):
+        Optimizer(BOX, constraints={"c": (None, 1.0)}, safety=0.9)
+    optimizer = Optimizer(BOX, constraints={"c": (None, 1.0)}, safety=0.9, initial_points=[[0.5, 0.5]])
+    optimizer.tell(optimizer.ask(), 1.0, constraints={"c": 2.0})
+    with pytest.raises(
+        SureholdError, match=r"nothing is known to be safe: no feasible trial in 1; the nearest missed c by 1\."
+    ):
+        optimizer.ask()
+
+
+def test_a_watched_output_changes_nothing():
+    plain, watching = (Optimizer(BOX, seed=2, constraints=c) for c in (None, {"temperature": (None, None)}))
+    for _ in range(14):
+        x = plain.ask()
+        assert np.array_equal(watching.ask(), x)
+        y = -float(((x - 0.3) ** 2).sum())
+        plain.tell(x, y)
+        watching.tell(x, y, constraints={"temperature": 20.0 + x[0]})
+    assert watching.recommend().outputs["temperature"].mean == pytest.approx(20.3, abs=0.05)
+    assert watching.outputs["temperature"].shape == (14,)
+
+
+@pytest.mark.parametrize("criterion", ["ei", "pi", "ucb", "thompson", "log_ei"])
+def test_every_criterion_comes_near(criterion):
+    optimizer = run(22, lambda x: x.sum(), lambda x: 0.6 - x[0] - x[1] ** 2, seed=0, criterion=criterion)
+    best = optimizer.recommend()
+    assert best.feasible == 1.0
+    assert best.x.sum() < 0.72  # 0.6 at (0.6, 0)
+
+
+@pytest.mark.parametrize("risk", ["cvar", "worst"])
+def test_risk_measures_take_constraints(risk):
+    optimizer = run(
+        14, lambda x: x.sum(), lambda x: 0.6 - x[0] - x[1], seed=0, risk=risk, input_noise=InputNoise.unit(0.02)
+    )
+    best = optimizer.recommend("box")
+    assert best.feasible > 0.94
+    assert best.x.sum() < 0.85
+
+
+def test_parallel_trials_differ_where_nothing_is_feasible():
+    optimizer = run(8, lambda x: x[0], lambda x: 2.0 + x[1], (None, 1.0), seed=0, n_initial=8)
+    U = optimizer.ask(4)
+    distances = np.linalg.norm(U[:, None] - U, axis=2)[np.triu_indices(4, 1)]
+    assert distances.min() > 1e-3
+
+
+def test_failed_trials_need_no_outputs_and_an_output_may_be_missing():
+    optimizer = Optimizer(BOX, constraints={"c": (None, 0.5)}, n_initial=4, seed=0)
+    optimizer.tell([0.2, 0.2], failed=True)
+    optimizer.tell([0.4, 0.2], 3.0, constraints={"c": None})
+    optimizer.tell([0.6, 0.2], 1.0, constraints={"c": 0.2})
+    optimizer.tell([0.8, 0.2], 2.0, constraints={"c": 0.9})
+    assert optimizer.recommend().observed in (1.0, 3.0)  # by the model, c = 0.2 at 0.6 says little about 0.4
+    assert np.isnan(optimizer.outputs["c"]).tolist() == [True, True, False, False]
+    assert not optimizer.feasible[3]
+    assert optimizer.ask().shape == (2,)
+
+
+@pytest.mark.parametrize(
+    "settings", [{"allowed": ["x1 + x2 <= 1.5", Linear({"x1": 1.0}, lower=0.1)]}, {"feasible": 0.8}]
+)
+def test_a_loaded_optimizer_goes_on(tmp_path, settings):
+    optimizer = run(12, lambda x: x.sum(), gramacy, seed=3, **settings)
+    optimizer.save(tmp_path / "run.json")
+    again = Optimizer.load(tmp_path / "run.json")
+    assert np.array_equal(again.outputs["c"], optimizer.outputs["c"])
+    assert np.array_equal(again.ask(), optimizer.ask())
+    restored = Optimizer(BOX, direction="minimize", constraints={"c": (None, 0.0)}, seed=3, **settings)
+    restored.restore(optimizer.X, optimizer.y, outputs=optimizer.outputs["c"][:, None])
+    assert restored.recommend().x == pytest.approx(optimizer.recommend().x, abs=1e-9)
+
+
+def test_a_function_is_no_part_of_the_file(tmp_path):
+    optimizer = Optimizer(BOX, allowed=lambda x: x[0] < 0.5, seed=0)
+    optimizer.save(tmp_path / "run.json")
+    with pytest.raises(InputError, match=r"allowed was .*load\(path, allowed=\.\.\.\)"):
+        Optimizer.load(tmp_path / "run.json")
+    again = Optimizer.load(tmp_path / "run.json", allowed=lambda x: x[0] < 0.5)
+    assert np.array_equal(again.ask(), optimizer.ask())
+
+
+def test_a_whole_run_takes_outputs_and_survives_missing_ones():
+    def f(x):
+        outputs = {"c": gramacy(x)} if x[0] < 0.9 else {}
+        return x.sum(), outputs
+
+    result = minimize(f, BOX, 20, constraints={"c": (None, 0.0)}, seed=0)
+    assert result.recommendation.feasible == 1.0
+    assert gramacy(result.X[result.best_index]) <= 0.0
+    assert any(trial.outputs.get("c") == gramacy(trial.x) for trial in result.trials)
+    for trial in result.trials:
+        assert ("says nothing about 'c'" in trial.failure) == (trial.x[0] >= 0.9)
+    with pytest.raises(SureholdError, match="says nothing about 'c'"):
+        minimize(lambda x: x.sum(), BOX, 20, constraints={"c": (None, 0.0)})
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"feasible": 1.0}, "feasible is 1.0"),
+        ({"feasible": True}, "feasible is True"),
+        ({"safety": 0.0}, "safety is 0.0"),
+        ({"constraints": {"c": (None, 1.0)}, "preset": "thesis"}, "knows no constraints"),
+        ({"allowed": "x1 <= 0.5", "initial_points": [[0.7, 0.1]]}, "which is not allowed"),
+    ],
+)
+def test_bad_settings(settings, message):
+    with pytest.raises(InputError, match=message):
+        Optimizer(BOX, **settings)

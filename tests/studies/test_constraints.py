@@ -1,0 +1,181 @@
+import asyncio
+import json
+
+import httpx
+import numpy as np
+import optuna
+import pytest
+from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
+
+import surehold as sh
+from surehold.cli import run
+from surehold.errors import InputError
+from surehold.studies.ledger import AnswerRefused
+from surehold.studies.replay import result_of
+from surehold.studies.robot import RobotStudy
+from surehold.studies.search_space import SearchSpace
+from surehold.studies.service import service
+from surehold.studies.settings import StudySettings
+from surehold.studies.trial_function import trial_function
+from surehold.studies.worker import work
+
+TOKEN = "0123456789abcdef0123"
+SPACE = SearchSpace({"a": (0.0, 1.0), "b": FloatDistribution(0.1, 10.0, log=True), "n": IntDistribution(1, 4)})
+OPTIMIZER = {
+    "seed": 1,
+    "n_initial": 6,
+    "constraints": {"torque": [None, 3.0], "temperature": [None, None]},
+    "allowed": ["a + b <= 5", "n + 2*a <= 4"],
+}
+
+
+@pytest.fixture
+def study(tmp_path):
+    made = RobotStudy.create("rig", StudySettings(SPACE, None, {}, OPTIMIZER), str(tmp_path / "journal.log"))
+    yield made
+    made.close()
+
+
+def outcome(p):
+    return p["a"] + 0.1 * p["n"], {"torque": 4.0 * p["a"] + 0.1 * p["b"], "temperature": 20.0}
+
+
+def test_a_study_keeps_constraints(study):
+    for _ in range(14):
+        asked = study.ask()
+        p = asked.parameters
+        assert p["a"] + p["b"] <= 5.0 + 1e-9
+        assert p["n"] + 2.0 * p["a"] <= 4.0 + 1e-9
+        value, outputs = outcome(p)
+        study.tell(asked.id, value, constraints=outputs)
+    again = RobotStudy.open("rig", study.storage.url)
+    best = again.recommend()
+    again.close()
+    assert outcome(best.parameters)[1]["torque"] <= 3.0
+    assert best.feasible == 1.0
+    assert best.outputs["temperature"] == pytest.approx(20.0, abs=0.1)
+    assert best.mean > 0.85
+    assert again.settings.to_json() == study.settings.to_json()
+    assert result_of(study).recommendation.outputs["torque"].mean == pytest.approx(best.outputs["torque"])
+
+
+def test_the_first_answer_counts_for_outputs_too(study):
+    asked = study.ask()
+    with pytest.raises(InputError, match="says nothing about 'torque'"):
+        study.tell(asked.id, 1.0)
+    study.tell(asked.id, 1.0, constraints={"torque": 2.0})
+    assert study.tell(asked.id, 1.0, constraints={"torque": 2.0}).already
+    with pytest.raises(AnswerRefused, match="with other outputs"):
+        study.tell(asked.id, 1.0, constraints={"torque": 2.5})
+    failed = study.ask()
+    study.tell(failed.id, failed=True)
+    assert study.add({"a": 0.1, "b": 1.0, "n": 2}, 0.4, constraints={"torque": 9.0}) == 2
+    assert study.recommend().trial == asked.id
+
+
+def test_workers_store_outputs(study):
+    function = trial_function(lambda x: outcome({"a": x[0], "b": x[1], "n": x[2]}), SPACE)
+    assert work(study, function, most=3) == 3
+    stored = [trial.user_attrs["surehold:outputs"] for trial in study.trials()]
+    assert [set(outputs) for outputs in stored] == [{"torque", "temperature"}] * 3
+
+
+def test_over_http(study):
+    application = service(study, TOKEN)
+
+    async def talk():
+        transport = httpx.ASGITransport(application)
+        headers = {"Authorization": f"Bearer {TOKEN}"}
+        async with httpx.AsyncClient(
+            transport=transport, base_url="http://127.0.0.1/studies/rig", headers=headers
+        ) as c:
+            asked = (await c.post("/ask", json={})).json()
+            answer = {"id": asked["id"], "value": 0.5}
+            refused = await c.post("/tell", json=answer)
+            assert refused.status_code == 422
+            assert "torque" in refused.json()["detail"]
+            assert (await c.post("/tell", json=answer | {"constraints": {"torque": "x"}})).status_code == 422
+            assert (await c.post("/tell", json=answer | {"constraints": {"torque": 3.5}})).status_code == 200
+            best = (await c.get("/recommendation")).json()
+            assert best["infeasible"] == "no feasible trial in 1; the nearest missed torque by 0.5."
+
+    asyncio.run(talk())
+
+
+def test_by_commands(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("SUREHOLD_STORAGE", raising=False)
+
+    def call(*line, code=0):
+        capsys.readouterr()
+        found = run(["study", *line])
+        out, err = capsys.readouterr()
+        assert found == code, err
+        return out + err
+
+    call(
+        "create",
+        "rig",
+        "--parameters",
+        "a=0:1,b=0:1",
+        "--noise",
+        "none",
+        "--constraint",
+        "torque<=3",
+        "--constraint",
+        "temperature",
+        "--allowed",
+        "a + b <= 1.2",
+        "--feasible",
+        "0.9",
+    )
+    asked = json.loads(call("ask", "rig", "--json"))
+    assert sum(asked["parameters"].values()) <= 1.2
+    assert "says nothing about 'torque'" in call("tell", "rig", "0", "0.5", code=2)
+    call("tell", "rig", "0", "0.5", "--constraints", "torque=3.5,temperature=20")
+    call("add", "rig", "0.3", "--at", "a=0.1,b=0.1", "--constraints", "torque=2")
+    told = call("recommend", "rig")
+    assert "100.0% of executions keep all constraints" in told
+    assert "The highest observed trial gave 0.5, but missed torque by 0.5." in told
+    assert "is not understood" in call("create", "other", "--parameters", "a=0:1", "--constraint", "torque<", code=2)
+
+
+def test_optunas_own_trials(tmp_path):
+    def rule(parameters):
+        return parameters["grip"] == "pinch" or parameters["a"] < 0.5
+
+    space = {"a": FloatDistribution(0.0, 1.0), "grip": CategoricalDistribution(["pinch", "power"])}
+    sampler = sh.Sampler(space, seed=0, n_initial=5, allowed=rule, constraints={"torque": (None, 0.6)})
+    made = optuna.create_study(direction="minimize", sampler=sampler)
+
+    def objective(trial):
+        a = trial.suggest_float("a", 0.0, 1.0)
+        grip = trial.suggest_categorical("grip", ["pinch", "power"])
+        assert rule({"a": a, "grip": grip})
+        trial.set_user_attr("torque", 1.0 - a)
+        return a + (grip == "pinch")
+
+    made.optimize(objective, n_trials=16)
+    best = sampler.optimizer(made).recommend()
+    assert best.feasible == 1.0
+    assert -best.observed == pytest.approx(0.4, abs=0.02)
+
+
+def test_a_choice_cannot_be_weighed():
+    space = {"a": (0.0, 1.0), "grip": CategoricalDistribution(["pinch", "power"])}
+    with pytest.raises(InputError, match="'grip' is a choice"):
+        sh.Sampler(space, allowed="a + grip <= 1")
+    with pytest.raises(InputError, match="'z' is unknown"):
+        sh.Sampler(space, allowed="a + z <= 1")
+
+
+def test_linear_constraints_count_in_the_parameters_own_units():
+    sampler = sh.Sampler(SPACE, allowed="b <= 0.2", seed=0, n_initial=8)
+    made = optuna.create_study(sampler=sampler)
+    values = []
+    for _ in range(8):
+        trial = made.ask(SPACE.distributions)
+        values.append(trial.params["b"])
+        made.tell(trial, 1.0)
+    assert max(values) <= 0.2 + 1e-9
+    assert np.ptp(values) > 0.04
