@@ -89,7 +89,7 @@ def test_error_is_that_at_fresh_inputs():
         errors.append((at_fresh, found.error, alone))
     at_fresh, weighted, alone = np.mean(errors, axis=0)
     assert weighted == pytest.approx(at_fresh, rel=0.4)
-    assert alone < 0.6 * at_fresh
+    assert alone < 0.7 * at_fresh
 
 
 def test_a_model_that_sees_islands_is_found_out():

@@ -109,9 +109,9 @@ def shares(X: NDArray[np.float64]) -> NDArray[np.float64]:
 
     By the points of a Sobol sequence; of equal points the first has all.
     """
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
     from scipy.stats import qmc
 
     points = qmc.Sobol(X.shape[1], scramble=False).random(DIAGNOSIS_POINTS)
-    _, nearest = cKDTree(X).query(points)
+    _, nearest = KDTree(X).query(points)
     return np.bincount(nearest, minlength=len(X)) / DIAGNOSIS_POINTS

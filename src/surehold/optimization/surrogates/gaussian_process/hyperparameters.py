@@ -158,7 +158,7 @@ def _learn_one_or_two_scales(evidence: Evidence, learning: Learning, rng: np.ran
     else:
         first = _around(long, learning, m - keep, one, root_one, rng, cost)
         second = _around(evidence, learning, keep, two, root_two, rng)
-    shape = np.tile([evidence.prior_mean[d], _ABSENT], (m - keep, 1))
+    shape = np.tile([float(evidence.prior_mean[d]), _ABSENT], (m - keep, 1))
     alone = np.column_stack([first.particles[:, :d], shape, first.particles[:, d:]])
     return Learnt(np.concatenate([alone, second.particles]), first.evaluations + second.evaluations)
 
