@@ -48,6 +48,8 @@ def warm_up(problem: Any, settings: dict[str, Any]) -> None:
     own: Callable[[], Any] | None = getattr(problem, "warm_up", None)
     if own is not None:
         own()
-    few = {name: value for name, value in settings.items() if name not in ("allowed", "constraints")} | {"n_initial": 4}
+    few: dict[str, Any] = {
+        name: value for name, value in settings.items() if name not in ("allowed", "constraints")
+    } | {"n_initial": 4}
     center = problem.box.from_unit([0.5] * problem.box.dimension)
     maximize(lambda x: -float(sum(((x - center) / problem.box.widths) ** 2)), problem.box, 6, progress=False, **few)

@@ -19,6 +19,7 @@ from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.input import region_of
 from surehold.optimization.diagnosis import Diagnosis
+from surehold.optimization.lattice import lattice_of
 from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise, noise_of_coordinates

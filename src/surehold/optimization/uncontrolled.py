@@ -114,7 +114,7 @@ def _groups(uncontrolled: Mapping[Any, Any] | None) -> Groups:
             found[names] = given
             continue
         try:
-            samples = np.array(given, dtype=np.float64)
+            samples: NDArray[Any] = np.array(given, dtype=np.float64)
         except (TypeError, ValueError):
             samples = np.empty(0)
         samples = samples[:, None] if samples.ndim == 1 else samples

@@ -145,7 +145,7 @@ class Succeeds:
 def _distances(A: NDArray[np.float64], B: NDArray[np.float64]) -> NDArray[np.float64]:
     from scipy.spatial.distance import cdist
 
-    return cdist(A, B)
+    return np.asarray(cdist(A, B), dtype=np.float64)
 
 
 def _matern(r: NDArray[np.float64]) -> NDArray[np.float64]:
