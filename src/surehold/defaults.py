@@ -266,8 +266,8 @@ FEASIBLE: Final = 0.95
 REGION_POOL: Final = 256
 #: Length-scales, over sqrt(d) box widths, and signal variances of the model of where trials fail, all combined and
 #: weighed by their evidence. Never measured on their own; the whole: python -m benchmarks.failures.
-FAILURE_LENGTHS: Final = (0.08, 0.16, 0.32, 0.64)
-FAILURE_SIGNALS: Final = (1.0, 6.0, 36.0)
+FAILURE_LENGTHS: Final = (0.08, 0.16, 0.32, 0.64, 1.28)
+FAILURE_SIGNALS: Final = (1.0, 10.0, 100.0, 1000.0)
 #: Under input noise a trial may become the answer where executions succeed with this share of the best probability
 #: among trials, if they do not with `FEASIBLE`: few failures leave the model unsure everywhere. Never measured.
 SUCCESS_SHARE: Final = 0.9

@@ -3,12 +3,13 @@
 Legend
     t      n labels, 1 where a trial gave a value and -1 where it failed
     f      latent function with covariance K = s2 k(r / l) + 1, k Matern-5/2; the 1 is a constant of unknown size
-    W      -d2 log p(t | f) / df2, B = I + W^1/2 K W^1/2, a = K^-1 f at the mode
+    S      precisions of the sites, normal stand-ins for the labels' likelihoods; B = I + S^1/2 K S^1/2
     mu, v  mean and variance of f at a query; P = Phi(mu / sqrt(1 + v))
     j      settings (l, s2) on a grid, weighed by their evidence: few labels say little about both
 
-Laplace's approximation: Rasmussen and Williams 2006, algorithms 3.1 and 3.2, equation (3.82). That a criterion times
-this probability converges is shown by Bachoc, Helbert and Picheny 2020.
+Expectation propagation (Minka 2001; Rasmussen and Williams 2006, section 3.6): Laplace's approximation, at the mode, is
+so unsure where labels agree that the search keeps returning to places that failed. That a criterion times this
+probability converges is shown by Bachoc, Helbert and Picheny 2020.
 """
 
 from typing import Final, NamedTuple
@@ -21,54 +22,68 @@ from scipy.special import log_ndtr, ndtr
 from surehold.defaults import FAILURE_LENGTHS, FAILURE_SIGNALS
 from surehold.optimization.noise.perturbations import Perturbations
 
-__all__ = ["Succeeds", "SuccessModel", "laplace"]
+__all__ = ["Succeeds", "SuccessModel", "propagate"]
 
-_NEWTON: Final = 60  # steps at most; a dozen are enough
-_CONVERGED: Final = 1e-9
+_SWEEPS: Final = 60
+_DAMPING: Final = 0.8
+_CONVERGED: Final = 1e-5
 _LOG_SQRT_2PI: Final = 0.5 * np.log(2.0 * np.pi)
 
 
-class Mode(NamedTuple):
-    """Laplace's approximation for one setting."""
+class Sites(NamedTuple):
+    """Expectation propagation's approximation for one setting."""
 
     a: NDArray[np.float64]
-    """K^-1 f, (n,)"""
-    root_w: NDArray[np.float64]
-    """W^1/2, (n,)"""
+    """(K + S^-1)^-1 of the sites' means: the mean at a query is k'a, (n,)"""
+    root: NDArray[np.float64]
+    """S^1/2, (n,)"""
     lower: NDArray[np.float64]
     """Cholesky factor of B, (n, n)"""
     log_evidence: float
 
 
-def laplace(K: NDArray[np.float64], t: NDArray[np.float64]) -> Mode:
-    """Return the mode of f given labels t (n,) of 1 and -1 and the covariance K (n, n)."""
+def propagate(K: NDArray[np.float64], t: NDArray[np.float64]) -> Sites:
+    """Return the sites for labels t (n,) of 1 and -1 and the covariance K (n, n); all are updated at once, damped."""
     n = len(t)
-    f, a = np.zeros(n), np.zeros(n)
-    value = -np.inf
-    for _ in range(_NEWTON):
-        z = t * f
+    precision, shift = np.zeros(n), np.zeros(n)  # of the sites: S and S times their means
+    for _ in range(_SWEEPS):
+        mean, variance, root, lower = _marginals(K, precision, shift)
+        cavity, cavity_shift = 1.0 / variance - precision, mean / variance - shift
+        z = t * cavity_shift / np.sqrt(cavity * (cavity + 1.0))
         ratio = np.exp(-0.5 * z * z - _LOG_SQRT_2PI - log_ndtr(z))
-        W = ratio * (ratio + z)
-        root = np.sqrt(W)
-        lower = cholesky(np.eye(n) + root[:, None] * K * root, lower=True)
-        b = W * f + t * ratio
-        step = b - root * cho_solve((lower, True), root * (K @ b)) - a
-        before, size = value, 1.0
-        while size > 1e-4:  # a full step may overshoot where labels contradict each other
-            tried = a + size * step
-            value = float(-0.5 * tried @ (K @ tried) + log_ndtr(t * (K @ tried)).sum())
-            if value >= before - 1e-12:
-                break
-            size *= 0.5
-        a = a + size * step
-        f = K @ a
-        if value - before < _CONVERGED:
+        tilted_mean = cavity_shift / cavity + t * ratio / np.sqrt(cavity * (cavity + 1.0))
+        tilted = 1.0 / cavity - ratio * (z + ratio) / (cavity * (cavity + 1.0))
+        new = np.maximum(1.0 / tilted - cavity, 1e-12)
+        new_shift = tilted_mean / tilted - cavity_shift
+        moved = float(np.abs(new - precision).max() / (1.0 + precision.max()))
+        precision = precision + _DAMPING * (new - precision)
+        shift = shift + _DAMPING * (new_shift - shift)
+        if moved < _CONVERGED:
             break
-    z = t * f
-    ratio = np.exp(-0.5 * z * z - _LOG_SQRT_2PI - log_ndtr(z))
-    root = np.sqrt(ratio * (ratio + z))
-    lower = cholesky(np.eye(n) + root[:, None] * K * root, lower=True)
-    return Mode(a, root, lower, value - float(np.log(np.diag(lower)).sum()))
+    mean, variance, root, lower = _marginals(K, precision, shift)
+    cavity, cavity_shift = 1.0 / variance - precision, mean / variance - shift
+    z = t * cavity_shift / np.sqrt(cavity * (cavity + 1.0))
+    total, before = cavity + precision, cavity_shift / cavity
+    evidence = (  # Rasmussen and Williams 2006, (3.65), (3.73) and (3.74)
+        log_ndtr(z).sum()
+        + 0.5 * np.log1p(precision / cavity).sum()
+        - np.log(np.diag(lower)).sum()
+        + 0.5 * (shift @ mean - (shift * shift / total).sum())
+        + 0.5 * (before * cavity / total * (precision * before - 2.0 * shift)).sum()
+    )
+    a = shift - root * cho_solve((lower, True), root * (K @ shift))
+    return Sites(a, root, lower, float(evidence))
+
+
+def _marginals(
+    K: NDArray[np.float64], precision: NDArray[np.float64], shift: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return mean and variance of f given the sites, (n,) each, S^1/2 and the Cholesky factor of B."""
+    root = np.sqrt(precision)
+    lower = cholesky(np.eye(len(K)) + root[:, None] * K * root, lower=True)
+    half = solve_triangular(lower, root[:, None] * K, lower=True)
+    covariance = K - half.T @ half
+    return covariance @ shift, np.diag(covariance).copy(), root, lower
 
 
 class SuccessModel:
@@ -87,7 +102,7 @@ class SuccessModel:
         self._X: Final = X
         d = X.shape[1]
         settings = [(length * d**0.5, s2) for length in FAILURE_LENGTHS for s2 in FAILURE_SIGNALS]
-        modes = [laplace(s2 * _matern(_distances(X, X) / length) + 1.0, t) for length, s2 in settings]
+        modes = [propagate(s2 * _matern(_distances(X, X) / length) + 1.0, t) for length, s2 in settings]
         logs = np.array([mode.log_evidence for mode in modes])
         weights = np.exp(logs - logs.max())
         kept = np.flatnonzero(weights > 1e-3)
@@ -103,7 +118,7 @@ class SuccessModel:
         for weight, (length, s2, mode) in zip(self._weights, self._parts, strict=True):
             k = s2 * _matern(distances / length) + 1.0  # (q, n)
             mu = k @ mode.a
-            solved = solve_triangular(mode.lower, (k * mode.root_w).T, lower=True)  # (n, q)
+            solved = solve_triangular(mode.lower, (k * mode.root).T, lower=True)  # (n, q)
             v = np.maximum(s2 + 1.0 - np.square(solved).sum(axis=0), 0.0)
             scale = np.sqrt(1.0 + v)
             total += weight * ndtr(mu / scale)
@@ -112,7 +127,7 @@ class SuccessModel:
             # dk/dx = -5/3 s2 (1 + sqrt5 r) exp(-sqrt5 r) (x - x_i) / l^2
             r = 5.0**0.5 * distances / length
             slope = (-5.0 / 3.0 * s2 / length**2) * ((1.0 + r) * np.exp(-r))  # (q, n), times (x - x_i)
-            back = solve_triangular(mode.lower, solved, lower=True, trans=1).T * mode.root_w  # (q, n)
+            back = solve_triangular(mode.lower, solved, lower=True, trans=1).T * mode.root  # (q, n)
             by_k = mode.a / scale[:, None] + (mu / scale**3)[:, None] * back  # d (mu / scale) / dk
             inner = by_k * slope
             density = np.exp(-0.5 * (mu / scale) ** 2 - _LOG_SQRT_2PI)
