@@ -242,3 +242,18 @@ APART: Final = 0.1
 FEASIBLE: Final = 0.95
 #: Random allowed points among which an initial design replaces those of its points that are not. Never measured.
 REGION_POOL: Final = 256
+
+# --- success and failure ----------------------------------------------------------------------------------------------
+
+#: Prior of the latent function behind success and failure, in probit units: mean and standard deviation of the
+#: logarithm of its variance, and variance of its constant mean. Half of all places succeed by 16 to 84 % or are
+#: clearer. Never measured against others.
+SUCCESS_SIGNAL_PRIOR: Final = (0.7, 0.7)
+SUCCESS_MEAN_VARIANCE: Final = 1.0
+#: States of the slice sampler that are dropped first: it starts at the prior, not at a mode. Never measured.
+SUCCESS_BURN_IN: Final = 20
+#: Joint draws by which the spread of a share of successes under the input noise is known. Never measured.
+SUCCESS_DRAWS: Final = 64
+#: A place whose probability of success is known to this standard deviation is settled: it is not tried again as long
+#: as there are others. After the estimation bounds of Tesch et al. 2013. Never measured against others.
+SETTLED: Final = 0.02
