@@ -14,6 +14,7 @@ from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.surrogates.named import refuse_settings, surrogate_named
 from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate
+from surehold.optimization.surrogates.success.model import SuccessProcess
 from surehold.optimization.trials import Trials
 
 __all__ = ["ResponseModel", "chosen_surrogate"]
@@ -103,6 +104,9 @@ class ResponseModel:
         return posterior
 
     def _conditioned(self, trials: Trials) -> Posterior:
+        if isinstance(self._surrogate, SuccessProcess):
+            rng = np.random.default_rng([self._seed, 1, 0])
+            return self._surrogate.condition(trials.reached, trials.values, rng, trials=trials.executions)
         values = trials.modelled if self._screened else trials.values
         if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self._straying.unit_roots(self._box, trials.commanded).copy()

@@ -50,8 +50,10 @@ def test_mode_and_evidence_as_an_independent_maximization_gives(trials):
         return s[i] * log_ndtr(f) + (r[i] - s[i]) * log_ndtr(-f)
 
     h, f = 1e-4, K @ a
-    curvature = [-(log_likelihood(f[i] + h, i) - 2 * log_likelihood(f[i], i) + log_likelihood(f[i] - h, i)) / h**2
-                 for i in range(20)]
+    curvature = [
+        -(log_likelihood(f[i] + h, i) - 2 * log_likelihood(f[i], i) + log_likelihood(f[i] - h, i)) / h**2
+        for i in range(20)
+    ]
     np.testing.assert_allclose(W, curvature, rtol=1e-4, atol=1e-5)
     expected = log_joint(a, K, s, r) - 0.5 * np.linalg.slogdet(np.eye(20) + K * W)[1]
     assert evidence == pytest.approx(expected, abs=1e-8)
@@ -65,7 +67,7 @@ def test_likelihood_far_in_the_tail_stays_finite():
 
 
 def test_probabilities_are_those_of_exact_sampling():
-    """Elliptical slice sampling of f itself (Murray et al. 2010), written here; probabilities within .01 on average."""
+    """Elliptical slice sampling of f itself (Murray et al. 2010), written here; probabilities within .01."""
     X, y = data(25)
     Q = np.random.default_rng(5).random((12, 2))
     K = covariance(X, X) + 1e-8 * np.eye(25)
@@ -91,15 +93,16 @@ def test_probabilities_are_those_of_exact_sampling():
             kept += 1
     exact = total / kept
     ours = fixed(X, y).moments(Q).mean[0]
-    assert np.abs(ours - exact).max() < 0.015
-    assert np.abs(ours - exact).mean() < 0.01
+    assert np.abs(ours - exact).max() < 0.01
 
 
 def test_moments_of_the_probability_by_quadrature():
     for mu, v in [(0.3, 0.5), (-1.7, 2.0), (4.0, 0.01), (0.0, 1.0)]:
         mean, variance, _ = probability(np.array(mu), np.array(v))
         moments = [
-            integrate.quad(lambda f, k=k: ndtr(f) ** k * stats.norm.pdf(f, mu, np.sqrt(v)), mu - 12 * v**0.5, mu + 12 * v**0.5)[0]
+            integrate.quad(
+                lambda f, k=k: ndtr(f) ** k * stats.norm.pdf(f, mu, np.sqrt(v)), mu - 12 * v**0.5, mu + 12 * v**0.5
+            )[0]
             for k in (1, 2)
         ]
         assert mean == pytest.approx(moments[0], abs=1e-9)
@@ -117,7 +120,9 @@ def test_gradients_of_moments_and_averages_by_differences():
             step = 1e-5 * np.eye(2)[k]
             above, below = moments(Q + step), moments(Q - step)
             np.testing.assert_allclose(at.mean_gradient[..., k], (above.mean - below.mean) / 2e-5, atol=1e-5)
-            np.testing.assert_allclose(at.variance_gradient[..., k], (above.variance - below.variance) / 2e-5, atol=1e-5)
+            np.testing.assert_allclose(
+                at.variance_gradient[..., k], (above.variance - below.variance) / 2e-5, atol=1e-5
+            )
 
 
 def test_draws_have_the_moments():

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.defaults import (
-    SUCCESS_BURN_IN,
     LENGTH_SCALE_DEVIATION,
     LENGTH_SCALE_MEDIAN,
     NUGGET,
     PARTICLES,
+    SUCCESS_BURN_IN,
     SUCCESS_MEAN_VARIANCE,
     SUCCESS_SIGNAL_PRIOR,
     THIN,

@@ -1,13 +1,13 @@
-"""The probability of success given trials: a mixture over particles of Laplace approximations.
+"""The probability of success given trials: a mixture over particles of Gaussian approximations.
 
 Legend
     f         latent Gaussian process, of mean mu and variance v at a query under one particle
     P         Phi(f), the probability of success; its mean is Phi(h), h = mu / sqrt(1 + v)
     T         Owen's function;  E[P^2] = Phi(h) - 2 T(h, 1 / sqrt(1 + 2 v))
-    W         -d2 log p / df2 at the mode, see `laplace`
+    tau       precisions of the sites of expectation propagation, see `propagation`
 
-Given W, f is the posterior of a regression with noise variances 1 / W: all predictions of the latent function, their
-gradients and joint draws are those of `GaussianProcessPosterior`, whose factor is (K + W^-1) = W^-1/2 B W^-1/2.
+Given tau, f is the posterior of a regression with noise variances 1 / tau: predictions of the latent function, their
+gradients and joint draws are those of `GaussianProcessPosterior`, whose factor is that of K + diag(1 / tau).
 """
 
 from typing import Final
@@ -22,10 +22,11 @@ from surehold.defaults import SUCCESS_DRAWS
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import Factors, GaussianProcessPosterior
-from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Regions
+from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
 from surehold.optimization.surrogates.success.laplace import Counts, laplace, prior_covariance
+from surehold.optimization.surrogates.success.propagation import propagated
 
-__all__ = ["SuccessPosterior", "probability"]
+__all__ = ["SuccessPosterior", "probability", "shares"]
 
 _STEP: Final = 1e-5  # of differences, in widths of the unit cube
 _LOG_SQRT_2PI: Final = 0.5 * np.log(2.0 * np.pi)
@@ -34,24 +35,35 @@ _LOG_SQRT_2PI: Final = 0.5 * np.log(2.0 * np.pi)
 class SuccessPosterior:
     """The probability of success, conditioned on trials; a `Posterior` of P, with that of f in `latent`.
 
-    `theta` (m, d + 1) are the particles. `information` (m, p) is W at pending trials, the last p inputs of `counts`.
+    `theta` (m, d + 1) are the particles, `pending` (p, d) trials under way, `sites` what `propagated` returns for each
+    particle, computed where None.
     """
 
-    def __init__(self, counts: Counts, theta: NDArray[np.float64], cost: int, pending: NDArray[np.float64] | None = None):
+    def __init__(
+        self,
+        counts: Counts,
+        theta: NDArray[np.float64],
+        cost: int,
+        pending: NDArray[np.float64] | None = None,
+        sites: tuple[NDArray[np.float64], ...] | None = None,
+    ):
         n, d = counts.X.shape
         self.counts: Final = counts
         self._theta: Final = theta
         self._pending: Final = np.empty((0, d)) if pending is None else pending
-        m, K = len(theta), np.empty((n, n))
-        root, alpha, inverse = np.empty((m, n)), np.empty((m, n)), np.zeros((m, n, n))
-        for j in range(m):
-            W, L = np.empty(n), np.zeros((n, n))
-            prior_covariance(theta[j], counts, K)
-            laplace(K, counts.successes, counts.trials, alpha[j], W, L)
-            root[j] = np.sqrt(W)
-            inverse[j] = solve_triangular(np.tril(L), np.diag(root[j]), lower=True)
+        m = len(theta)
+        if sites is None:
+            root, alpha, inverse = np.empty((m, n)), np.empty((m, n)), np.zeros((m, n, n))
+            K, L = np.empty((n, n)), np.empty((n, n))
+            for j in range(m):
+                a, W = np.empty(n), np.empty(n)
+                prior_covariance(theta[j], counts, K)
+                laplace(K, counts.successes, counts.trials, a, W, L)
+                root[j], alpha[j], inverse[j] = propagated(K, counts.successes, counts.trials, W, W * (K @ a) + a)
+            sites = root, alpha, inverse
+        root, alpha, inverse = (np.ascontiguousarray(part) for part in sites)
+        self._sites: Final = root, alpha, inverse
         self.latent: GaussianProcessPosterior = _regression(counts, theta, cost, Factors(inverse, alpha, 0))
-        self._root = root
         if len(self._pending):
             self.latent = self._with(self._pending, cost)
         self.diagnostics: Final = FitDiagnostics(n, cost, 0, False)
@@ -62,7 +74,7 @@ class SuccessPosterior:
         mu = self.latent.moments(X).mean  # (m, k)
         # expected information of one trial, phi^2 / (Phi (1 - Phi))
         information = np.exp(-mu * mu - 2.0 * _LOG_SQRT_2PI - log_ndtr(mu) - log_ndtr(-mu))
-        root = np.concatenate([self._root, np.sqrt(information)], axis=1)
+        root = np.concatenate([self._sites[0], np.sqrt(information)], axis=1)
         m, n = root.shape
         k = len(X)
         alpha = np.concatenate([self.latent.factors.alpha, np.zeros((m, k))], axis=1)
@@ -135,21 +147,19 @@ class SuccessPosterior:
         """Return joint draws (m, q, b, s) of P at points (q, s, d), made from independent standard normals (b, s)."""
         return ndtr(self.latent.sample(points, normals))
 
-    def shares(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return draws of the mean probability over equally weighted points (s, d), those of all particles."""
-        s = len(points)
-        return self.sample(points[None], _normals(s)).mean(axis=-1).ravel()
-
     def thinned(self, count: int, first: int = 0) -> "SuccessPosterior":
         """Return the posterior of about `count` of the particles, evenly taken from number `first` on."""
         step = max(1, len(self._theta) // count)
-        theta = np.ascontiguousarray(self._theta[first % step :: step])
-        return SuccessPosterior(self.counts, theta, self.diagnostics.evaluations, self._pending)
+        every = slice(first % step, None, step)
+        sites = tuple(part[every] for part in self._sites)
+        return SuccessPosterior(
+            self.counts, np.ascontiguousarray(self._theta[every]), self.diagnostics.evaluations, self._pending, sites
+        )
 
     def with_pending(self, X: NDArray[np.float64]) -> "SuccessPosterior":
         """Return the posterior as if one trial each at X (k, d) had brought what is expected: only variances shrink."""
         pending = np.concatenate([self._pending, X])
-        return SuccessPosterior(self.counts, self._theta, self.diagnostics.evaluations, pending)
+        return SuccessPosterior(self.counts, self._theta, self.diagnostics.evaluations, pending, self._sites)
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance E[P (1 - P)] (m, q) of one outcome of 0 or 1 at X (q, d), P being given."""
@@ -173,6 +183,11 @@ def probability(
     second_by_v = density * (np.exp(-0.5 * g * g - _LOG_SQRT_2PI) / narrow - mu / wide * ndtr(g))
     variance = np.maximum(second - mean * mean, 0.0)
     return mean, variance, (by_mu, by_v, second_by_mu - 2.0 * mean * by_mu, second_by_v - 2.0 * mean * by_v)
+
+
+def shares(posterior: Posterior, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return draws of the mean of P over equally weighted points (s, d), those of all particles together."""
+    return posterior.sample(points[None], _normals(len(points))).mean(axis=-1).ravel()
 
 
 def _normals(s: int) -> NDArray[np.float64]:
