@@ -157,3 +157,20 @@ def test_restored_shares_must_be_counts():
         optimizer.restore([[0.5]], [0.55], of=[10])
     with pytest.raises(InputError, match="of is"):
         optimizer.restore([[0.5]], [0.5], of=[0])
+
+
+def test_maximize_takes_functions_that_return_bool():
+    result = sh.maximize(lambda x: abs(x[0] - 0.7) < 0.15, BOX, 20, outcome="success", seed=0)
+    assert abs(result.recommendation.x[0] - 0.7) < 0.15
+    assert set(result.y) <= {0.0, 1.0}
+
+
+def test_maximize_refuses_values_and_gives_up_where_all_trials_raise():
+    with pytest.raises(InputError, match=r"returned 0\.5, but outcome='success'"):
+        sh.maximize(lambda x: 0.5, BOX, 10, outcome="success")
+
+    def broken(x):
+        raise RuntimeError("no rig")
+
+    with pytest.raises(sh.SureholdError, match="no rig"):
+        sh.maximize(broken, BOX, 10, outcome="success")

@@ -106,7 +106,9 @@ class ResponseModel:
     def _conditioned(self, trials: Trials) -> Posterior:
         if isinstance(self._surrogate, SuccessProcess):
             rng = np.random.default_rng([self._seed, 1, 0])
-            return self._surrogate.condition(trials.reached, trials.values, rng, trials=trials.executions)
+            return self._surrogate.condition(
+                trials.reached, trials.values, rng, trials=trials.executions.astype(np.float64)
+            )
         values = trials.modelled if self._screened else trials.values
         if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self._straying.unit_roots(self._box, trials.commanded).copy()

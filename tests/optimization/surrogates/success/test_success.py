@@ -63,7 +63,8 @@ def test_likelihood_far_in_the_tail_stays_finite():
     K = np.array([[1e6]])
     a, W, factor = np.empty(1), np.empty(1), np.empty((1, 1))
     assert np.isfinite(laplace(K, np.array([40.0]), np.array([40.0]), a, W, factor))
-    assert np.isfinite(a).all() and (W > 0.0).all()
+    assert np.isfinite(a).all()
+    assert (W > 0.0).all()
 
 
 def test_probabilities_are_those_of_exact_sampling():
@@ -101,7 +102,9 @@ def test_moments_of_the_probability_by_quadrature():
         mean, variance, _ = probability(np.array(mu), np.array(v))
         moments = [
             integrate.quad(
-                lambda f, k=k: ndtr(f) ** k * stats.norm.pdf(f, mu, np.sqrt(v)), mu - 12 * v**0.5, mu + 12 * v**0.5
+                lambda f, k=k, mu=mu, v=v: ndtr(f) ** k * stats.norm.pdf(f, mu, np.sqrt(v)),
+                mu - 12 * v**0.5,
+                mu + 12 * v**0.5,
             )[0]
             for k in (1, 2)
         ]

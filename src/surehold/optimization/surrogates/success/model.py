@@ -110,8 +110,8 @@ class SuccessProcess:
         mean, deviation = np.array(prior).T
         return Counts(
             np.ascontiguousarray(places, dtype=np.float64),
-            np.bincount(which.ravel(), successes, len(places)),
-            np.bincount(which.ravel(), trials, len(places)),
+            np.bincount(which.ravel(), successes, len(places)).astype(np.float64),
+            np.bincount(which.ravel(), trials, len(places)).astype(np.float64),
             np.ascontiguousarray(mean),
             np.ascontiguousarray(deviation),
             NUGGET,
