@@ -370,10 +370,13 @@ class Optimizer:
         InputError
             If shapes do not fit, an input is not finite, X or pending lie outside the box, or a value is infinite.
         """
+        values = self._sign * np.asarray(y, dtype=np.float64)
+        if self.outcome == "success":
+            values = np.where(np.isnan(values), 0.0, values)  # a failed trial did not succeed
         trials = Trials(self.box, self._trials.limits, self.outcome == "success")
         trials.restore(
             X,
-            self._sign * np.asarray(y, dtype=np.float64),
+            values,
             X if reached is None else reached,
             () if pending is None else pending,
             numbers,

@@ -215,7 +215,7 @@ class Sampler(BaseSampler):
     def _surrogate_for(self, trials: int) -> str | Surrogate:
         if self._surrogate is not None:
             return self._surrogate
-        return "gp" if trials < _MANY else "tgp"
+        return "gp" if trials < _MANY or self._settings.get("outcome") == "success" else "tgp"
 
     def _new_optimizer(self, space: SearchSpace, trials: int, direction: str) -> Optimizer:
         if space.box is None:
