@@ -104,9 +104,10 @@ class ResponseModel:
         return posterior
 
     def _conditioned(self, trials: Trials) -> Posterior:
-        if isinstance(self._surrogate, SuccessProcess):
+        model: object = self._surrogate
+        if isinstance(model, SuccessProcess):
             rng = np.random.default_rng([self._seed, 1, 0])
-            return self._surrogate.condition(
+            return model.condition(
                 trials.reached, trials.values, rng, trials=trials.executions.astype(np.float64)
             )
         values = trials.modelled if self._screened else trials.values

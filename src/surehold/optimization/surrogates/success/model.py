@@ -46,8 +46,6 @@ class SuccessProcess:
         Fixed variance of the latent function, in probit units.
     """
 
-    noisy: Final = True
-
     def __init__(
         self,
         *,
@@ -66,6 +64,11 @@ class SuccessProcess:
         )
         self._mean_variance = mean_variance
         self._learnt: OrderedDict[bytes, tuple[NDArray[np.float64], int]] = OrderedDict()  # saves time, changes nothing
+
+    @property
+    def noisy(self) -> bool:
+        """Observations carry noise: True."""
+        return True
 
     def condition(
         self,
