@@ -64,6 +64,9 @@ def maximize(
     tolerate_failures: Annotated[
         bool, typer.Option("--tolerate-failures", help="Go on although the first three trials all failed.")
     ] = False,
+    outcome: Annotated[
+        str, typer.Option(help="What a trial gives: value, or success (your function returns True or False).")
+    ] = "value",
     open_report: Open = False,
 ) -> None:
     """Find a maximum that still holds when the input is off.
@@ -98,6 +101,7 @@ def maximize(
         open_report=open_report,
         settings={"problem": problem, "bounds": bounds or None, "input noise": noise_text},
         direction=direction,
+        outcome=outcome,
         tolerate_failures=tolerate_failures,
         kept=kept,
     )

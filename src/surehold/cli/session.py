@@ -86,6 +86,7 @@ def run_session(
     disturbance: str = "the input is off",
     tolerate_failures: bool = False,
     direction: str = "maximize",
+    outcome: str = "value",
     success_above: float | None = None,
     outcomes: Callable[[Result], Mapping[str, int]] = lambda result: {},
     advice: str = "",
@@ -128,6 +129,8 @@ def run_session(
             "preset": preset or None,
             "direction": direction,
         }
+        if outcome != "value":
+            options["outcome"] = outcome
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
         console.print(
@@ -226,7 +229,9 @@ def _as_study(
     from surehold.studies.worker import work
 
     logging.set_verbosity(logging.WARNING)
-    optimizer = {name: options[name] for name in ("seed", "n_initial", "preset") if options[name] is not None}
+    optimizer = {
+        name: options[name] for name in ("seed", "n_initial", "preset", "outcome") if options.get(name) is not None
+    }
     space = SearchSpace(problem.box)
     settings = StudySettings(space, options["input_noise"], units, optimizer, kept.problem, options["direction"])
     storage = kept.storage or os.environ.get("SUREHOLD_STORAGE", "")

@@ -107,9 +107,7 @@ class ResponseModel:
         model: object = self._surrogate
         if isinstance(model, SuccessProcess):
             rng = np.random.default_rng([self._seed, 1, 0])
-            return model.condition(
-                trials.reached, trials.values, rng, trials=trials.executions.astype(np.float64)
-            )
+            return model.condition(trials.reached, trials.values, rng, trials=trials.executions.astype(np.float64))
         values = trials.modelled if self._screened else trials.values
         if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self._straying.unit_roots(self._box, trials.commanded).copy()
