@@ -271,3 +271,18 @@ FAILURE_SIGNALS: Final = (1.0, 10.0, 100.0, 1000.0)
 #: Under input noise a trial may become the answer where executions succeed with this share of the best probability
 #: among trials, if they do not with `FEASIBLE`: few failures leave the model unsure everywhere. Never measured.
 SUCCESS_SHARE: Final = 0.9
+
+# --- success and failure ----------------------------------------------------------------------------------------------
+
+#: Prior of the latent function behind success and failure, in probit units: mean and standard deviation of the
+#: logarithm of its variance, and variance of its constant mean. Half of all places succeed by 16 to 84 % or are
+#: clearer. Never measured against others.
+SUCCESS_SIGNAL_PRIOR: Final = (0.7, 0.7)
+SUCCESS_MEAN_VARIANCE: Final = 1.0
+#: States of the slice sampler that are dropped first: it starts at the prior, not at a mode. Never measured.
+SUCCESS_BURN_IN: Final = 20
+#: Joint draws by which the spread of a share of successes under the input noise is known. Never measured.
+SUCCESS_DRAWS: Final = 64
+#: A place whose probability of success is known to this standard deviation is settled: it is not tried again as long
+#: as there are others. After the estimation bounds of Tesch et al. 2013. Never measured against others.
+SETTLED: Final = 0.02

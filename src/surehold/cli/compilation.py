@@ -52,4 +52,9 @@ def warm_up(problem: Any, settings: dict[str, Any]) -> None:
         name: value for name, value in settings.items() if name not in ("allowed", "constraints")
     } | {"n_initial": 4}
     center = problem.box.from_unit([0.5] * problem.box.dimension)
-    maximize(lambda x: -float(sum(((x - center) / problem.box.widths) ** 2)), problem.box, 6, progress=False, **few)
+
+    def hill(x: Any) -> float:
+        value = -float(sum(((x - center) / problem.box.widths) ** 2))
+        return float(value > -0.1) if settings.get("outcome") == "success" else value
+
+    maximize(hill, problem.box, 6, progress=False, **few)

@@ -72,6 +72,9 @@ def maximize(
     feasible: Annotated[
         float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
     ] = 0.0,
+    outcome: Annotated[
+        str, typer.Option(help="What a trial gives: value, or success (your function returns True or False).")
+    ] = "value",
     open_report: Open = False,
 ) -> None:
     """Find a maximum that still holds when the input is off.
@@ -106,6 +109,7 @@ def maximize(
         open_report=open_report,
         settings={"problem": problem, "bounds": bounds or None, "input noise": noise_text},
         direction=direction,
+        outcome=outcome,
         tolerate_failures=tolerate_failures,
         kept=kept,
         required=limits_given(constraint, allowed, feasible),

@@ -86,6 +86,7 @@ def run_session(
     disturbance: str = "the input is off",
     tolerate_failures: bool = False,
     direction: str = "maximize",
+    outcome: str = "value",
     success_above: float | None = None,
     outcomes: Callable[[Result], Mapping[str, int]] = lambda result: {},
     advice: str = "",
@@ -132,6 +133,8 @@ def run_session(
             "direction": direction,
             **(required or {}),
         }
+        if outcome != "value":
+            options["outcome"] = outcome
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
         console.print(

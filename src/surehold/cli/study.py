@@ -74,6 +74,7 @@ def create(
     feasible: Annotated[
         float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
     ] = 0.0,
+    outcome: Annotated[str, typer.Option(help="Of a trial: value, or success (tell success or failure).")] = "value",
     storage: Storage = "",
     as_json: Json = False,
 ) -> None:
@@ -86,6 +87,7 @@ def create(
     space, described = _space_of(parameters, problem)
     optimizer: dict[str, Any] = {"seed": seed}
     optimizer |= {} if initial is None else {"n_initial": initial}
+    optimizer |= {} if outcome == "value" else {"outcome": outcome}
     optimizer |= {} if risk == "mean" else {"risk": risk}
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
     optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
@@ -131,7 +133,10 @@ def ask(
 def tell(
     name: Name,
     id: Annotated[int, typer.Argument(help="Of the trial, as ask printed it.")],
-    value: Annotated[str | None, typer.Argument(help="Outcome.", show_default=False)] = None,
+    value: Annotated[
+        str | None,
+        typer.Argument(help="Outcome: a number, or success or failure.", show_default=False),
+    ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="The trial gave nothing.")] = False,
     reached: Annotated[
         str, typer.Option(help="What was truly reached, where it differs: NAME=VALUE,...", show_default=False)

@@ -182,7 +182,7 @@ def maximize(
         Takes x (d,) in the box's units, or a dictionary {name: value} where the box has logarithms, whole numbers or
         choices; returns a number, with `constraints` a number and a dictionary of the further outputs,
         (y, {"torque": 3.1}). A trial that raises, or gives anything but one finite number, is recorded as failed and
-        the run goes on.
+        the run goes on. With `outcome="success"` it returns True or False.
     n_trials
         Budget, initial design included.
     callback
@@ -236,7 +236,7 @@ def maximize(
             for evaluation in evaluations:
                 trial = _told(optimizer, evaluation, len(trials))
                 trials.append(trial)
-                if not tolerate_failures and len(trials) == _PATIENCE < n_trials and np.isnan(optimizer.y).all():
+                if not tolerate_failures and len(trials) == _PATIENCE < n_trials and all(t.failure for t in trials):
                     raise _given_up(trials)
                 advance(trial.best)
                 if callback is not None and _ends(callback, trial):
@@ -251,7 +251,7 @@ def maximize(
         stopped = "Ctrl-C"
     finally:
         _close(evaluations)
-    if not np.any(np.isfinite(optimizer.y)):
+    if trials and all(trial.failure for trial in trials):
         raise SureholdError(f"all {len(trials)} trials failed; the last one: {trials[-1].failure}")
     last = trials[-1].recommendation if trials and len(trials) == len(optimizer.y) else None
     return Result(optimizer, tuple(trials), last or optimizer.recommend(), stopped == "Ctrl-C", stopped)
@@ -292,8 +292,17 @@ def _optimizer(box: Box, n_trials: int, settings: dict[str, Any]) -> Optimizer:
 def _told(optimizer: Optimizer, evaluation: Evaluation, index: int) -> Trial:
     asked, y, failure, outputs, seconds = evaluation
     try:
-        optimizer.tell(asked, None if failure else y, failed=bool(failure), constraints=outputs or None)
-    except InputError as error:  # of the outputs; the run is not lost for them
+        if optimizer.outcome == "success" and not failure:
+            if y not in (0.0, 1.0):
+                raise InputError(
+                    f"the function returned {y:g}, not True or False (or 1 or 0), as outcome='success' needs."
+                )
+            optimizer.tell(asked, success=bool(y))
+        else:
+            optimizer.tell(asked, None if failure else y, failed=bool(failure), constraints=outputs or None)
+    except InputError as error:  # of what the function returned; the run is not lost for it
+        if optimizer.outcome == "success":
+            raise
         y, failure, outputs = np.nan, str(error).rstrip("."), {}
         optimizer.tell(asked, failed=True)
     values = np.where(optimizer.feasible, optimizer.y, np.nan)

@@ -35,8 +35,10 @@ from surehold.optimization.strategy.promise import promise
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.strategy.trust_region import TrustRegion
+from surehold.optimization.success import check_combination, counted, described
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate, mixture
+from surehold.optimization.surrogates.success.model import SuccessProcess
 from surehold.optimization.trials import AskedTrial, Trials, initial_inputs, number_of, same
 
 if TYPE_CHECKING:
@@ -143,6 +145,11 @@ class Optimizer:
         says at which condition it is to be made. "measured", as on a robot: trials are made at whatever comes, and each
         tells it (`tell(x, y, reached={"payload": 1.3})`); what `ask` says of these variables is their mean. The answer
         is good on average over them, or by `risk`, and holds their mean, which nobody sets.
+    outcome
+        "value" (default): a trial gives a number. "success": it succeeds or fails, `tell(x, success=True)`, or does so
+        several times, `tell(x, successes=7, of=10)`. What is maximized is then the probability to succeed, under the
+        input noise; `y` and `predict` are shares and probabilities, and `Recommendation.probability_of_share` answers
+        how sure it is that nine of ten executions succeed. Model and criterion are its own (Tesch et al. 2013).
 
     Raises
     ------
@@ -179,13 +186,19 @@ class Optimizer:
         safety: float | None = None,
         conditions: Literal["commanded", "measured"] = "commanded",
         failures: Literal["lowest", "modelled"] = "lowest",
+        outcome: str = "value",
     ):
         given = {name: value for name, value in locals().items() if name not in ("self", "box")}
         if not isinstance(box, Box):
             raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
         if direction not in ("maximize", "minimize"):
             raise unknown_name("direction", direction, ("maximize", "minimize"))
+        if outcome not in ("value", "success"):
+            raise unknown_name("outcome", outcome, ("value", "success"))
+        if outcome == "success":
+            check_combination(given)
         self.box: Final = box
+        self.outcome: Final = outcome
         self.direction: Final = direction
         self._sign: Final = 1.0 if direction == "maximize" else -1.0
         self.input_noise: Final = noise_of_coordinates(input_noise, box)
@@ -200,7 +213,7 @@ class Optimizer:
             output_range = (-output_range[1], -output_range[0])
         thesis = None if preset is None else thesis_preset(preset)
         model = chosen_surrogate(
-            surrogate,
+            SuccessProcess() if outcome == "success" else surrogate,
             preset=preset,
             thesis=thesis,
             noise=noise,
@@ -226,6 +239,7 @@ class Optimizer:
             trust_region=TrustRegion(self.n_initial) if trust_region else None,
             thesis=thesis,
             allowed=None if region is None else region.contains,
+            outcome=outcome,
         )
         takes_noise = isinstance(model, NoisySurrogate)
         if noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
@@ -264,7 +278,7 @@ class Optimizer:
         if self._requirements is not None:
             rest = self._requirements.initial(rest, first, rng)
         self._design = np.concatenate([first, rest])
-        self._trials = Trials(box, limits)
+        self._trials = Trials(box, limits, outcome == "success")
 
     @staticmethod
     def default_n_initial(box: Box, variables: int | None = None) -> int:
@@ -314,6 +328,9 @@ class Optimizer:
         failed: bool | Literal["rig"] = False,
         reached: Any = None,
         constraints: Mapping[str, float | None] | None = None,
+        success: bool | None = None,
+        successes: int | None = None,
+        of: int | None = None,
     ) -> None:
         """Record the outcome y of a trial at x, or that it gave nothing.
 
@@ -337,6 +354,9 @@ class Optimizer:
         constraints
             {name: value} of the further outputs: every one that has a limit, unless the trial failed; None for one that
             could not be measured.
+        success, successes, of
+            In place of y where `outcome` is "success": True or False, or so many successes of so many executions. A
+            failed trial counts as one that did not succeed.
 
         Raises
         ------
@@ -345,9 +365,11 @@ class Optimizer:
             `AskedTrial` has been told before; if y is missing, not finite or not a number; if a failed trial comes with
             a value; if an output is missing, unknown or not finite. Nothing told before is lost.
         """
+        y, executions, failed = counted(self.outcome, y, success, successes, of, failed)
+        y = None if y is None else self._sign * number_of(y)
         if self._measured:
             reached = self._with_conditions(x, reached)
-        self._trials.tell(x, None if y is None else self._sign * number_of(y), failed, reached, constraints)
+        self._trials.tell(x, y, failed, reached, constraints, executions)
 
     def _with_conditions(self, x: Any, reached: Any) -> Any:
         """Return the reached input, of which only the uncontrolled variables must be said."""
@@ -377,12 +399,14 @@ class Optimizer:
         pending: ArrayLike | None = None,
         numbers: ArrayLike | None = None,
         outputs: ArrayLike | None = None,
+        of: ArrayLike | None = None,
     ) -> None:
         """Replace all trials by stored ones: X (t, d) with values y (t,), NaN for failed ones, and pending (p, d).
 
         `reached` (t, d) are the inputs that were truly reached, X where None. `numbers` (t + p,) are those of the
         trials, the pending ones last; 0, 1, 2, ... where None. `outputs` (t, o) are the further outputs in the order of
-        `constraints`, NaN where not measured. What is asked next is what an optimizer asks that was
+        `constraints`, NaN where not measured. `of` (t,) are the executions of which
+        y is the share of successes, 1 each where None. What is asked next is what an optimizer asks that was
         told these trials in this order.
 
         Raises
@@ -390,14 +414,18 @@ class Optimizer:
         InputError
             If shapes do not fit, an input is not finite, X or pending lie outside the box, or a value is infinite.
         """
-        trials = Trials(self.box, self._trials.limits)
+        values = self._sign * np.asarray(y, dtype=np.float64)
+        if self.outcome == "success":
+            values = np.where(np.isnan(values), 0.0, values)  # a failed trial did not succeed
+        trials = Trials(self.box, self._trials.limits, self.outcome == "success")
         trials.restore(
             X,
-            self._sign * np.asarray(y, dtype=np.float64),
+            values,
             X if reached is None else reached,
             () if pending is None else pending,
             numbers,
             outputs,
+            of,
         )
         if not trials.equal(self._trials):
             self._model.forget()
@@ -600,6 +628,8 @@ class Optimizer:
                 self._model.execution_noise,
                 "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
             )
+            if self.outcome == "success":
+                answer = described(answer, posterior, reached, u)
             if self._requirements is None:
                 return answer
             return self._requirements.described(answer, self._trials, u, reached, self._sign)

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.surrogates.protocol import Posterior
@@ -134,6 +135,16 @@ class Recommendation:
     def probability_below(self, value: float) -> float:
         """Return the probability that the next execution gives less than `value`."""
         return self.execution.probability_below(value)
+
+    def probability_of_share(self, level: float = 0.9) -> float:
+        """Return the probability that at least a share `level` of executions succeed, where trials succeed or fail.
+
+        Over what is not known: the share itself is that under the input noise. Raises InputError for a level outside
+        of [0, 1].
+        """
+        if not 0.0 <= level <= 1.0:
+            raise InputError(f"level is {level!r}; give a share of executions from 0 to 1.")
+        return 1.0 - self.expectation.probability_below(level)
 
 
 def outliers_in_words(numbers: Sequence[int]) -> str:

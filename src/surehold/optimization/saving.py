@@ -42,10 +42,17 @@ def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], t
                 "commanded": commanded.tolist(),
                 "reached": reached.tolist(),
                 "value": None if np.isnan(value) else float(value),
+                **({"executions": of} if of != 1 else {}),
                 **({"outputs": [None if np.isnan(v) else v for v in outputs]} if outputs else {}),
             }
-            for number, commanded, reached, value, outputs in zip(
-                trials.numbers, trials.commanded, trials.reached, trials.values, trials.outputs.tolist(), strict=True
+            for number, commanded, reached, value, outputs, of in zip(
+                trials.numbers,
+                trials.commanded,
+                trials.reached,
+                trials.values,
+                trials.outputs.tolist(),
+                trials.executions.tolist(),
+                strict=True,
             )
         ],
         "pending": [
@@ -90,7 +97,7 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
         settings = {name: _restored(name, value) for name, value in {**data["settings"], **given}.items()}
         told, pending = data["trials"], data["pending"]
         limits = limits_of(settings.get("constraints"))
-        trials = Trials(box, limits)
+        trials = Trials(box, limits, settings.get("outcome") == "success")
         trials.restore_cube(
             [trial["commanded"] for trial in told],
             [np.nan if trial["value"] is None else trial["value"] for trial in told],
@@ -98,6 +105,7 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
             [trial["commanded"] for trial in pending],
             [trial["number"] for trial in [*told, *pending]],
             np.array([trial.get("outputs", []) for trial in told], dtype=np.float64).reshape(len(told), len(limits)),
+            np.array([trial.get("executions", 1) for trial in told], dtype=np.intp),
         )
         inputs = np.concatenate([trials.commanded, trials.pending])
         if not (np.isfinite(trials.reached).all() and np.all((inputs >= 0.0) & (inputs <= 1.0))):

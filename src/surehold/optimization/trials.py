@@ -47,13 +47,16 @@ def same(u: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool
 class Trials:
     """All trials of one optimizer, in the order in which they were told.
 
-    `limits` are those of further outputs that every trial tells, watched ones included.
+    `limits` are those of further outputs that every trial tells, watched ones included. `counted`: whether values are
+    shares of executions that succeeded, among which there are no outliers.
     """
 
-    def __init__(self, box: Box, limits: tuple[Limit, ...] = ()):
+    def __init__(self, box: Box, limits: tuple[Limit, ...] = (), counted: bool = False):
         self._box = box
         self.limits: Final = limits
         self._outputs: list[tuple[float, ...]] = []
+        self._executions: list[int] = []
+        self._counted: Final = counted
         self._commanded: list[NDArray[np.float64]] = []
         self._reached: list[NDArray[np.float64]] = []
         self._values: list[float] = []
@@ -88,6 +91,11 @@ class Trials:
     def outputs(self) -> NDArray[np.float64]:
         """Further outputs in the order of `limits`, (t, o); NaN where one was not measured."""
         return np.array(self._outputs, dtype=np.float64).reshape(len(self), len(self.limits))
+
+    @property
+    def executions(self) -> NDArray[np.intp]:
+        """Executions that each value is the mean of, (t,)."""
+        return np.array(self._executions, dtype=np.intp)
 
     @property
     def numbers(self) -> NDArray[np.intp]:
@@ -134,6 +142,8 @@ class Trials:
         are no outliers, and where the others are all equal nothing can be said.
         """
         values = self.values
+        if self._counted:
+            return np.zeros(len(values), dtype=bool)
         told = np.sort(values[self.successful])
         n = len(told)
         unit = told / max(float(np.abs(told).max()), 1e-300) if n else told  # differences of the largest overflow
@@ -169,6 +179,7 @@ class Trials:
         failed: bool | str,
         reached: Any,
         outputs: Mapping[str, float | None] | None = None,
+        executions: int = 1,
     ) -> None:
         """Record the outcome of a trial; see `Optimizer.tell`. Nothing is recorded where an argument is bad."""
         if failed not in (False, True, "rig"):
@@ -185,6 +196,7 @@ class Trials:
             self._reached.append(actual)
             self._values.append(value)
             self._outputs.append(measured)
+            self._executions.append(executions)
             self._numbers.append(self.next_number if number is None else number)
         if number is not None:
             del self._pending[number]
@@ -197,10 +209,13 @@ class Trials:
         pending: ArrayLike,
         numbers: ArrayLike | None = None,
         outputs: ArrayLike | None = None,
+        executions: ArrayLike | None = None,
     ) -> None:
         """Take over stored trials; see `Optimizer.restore`. Nothing is taken over where an argument is bad."""
         commanded, waiting = self._all("X", X, inside=True), self._all("pending", pending, inside=True)
-        self.restore_cube(commanded, y, self._all("reached", reached, inside=False), waiting, numbers, outputs)
+        self.restore_cube(
+            commanded, y, self._all("reached", reached, inside=False), waiting, numbers, outputs, executions
+        )
 
     def restore_cube(
         self,
@@ -210,6 +225,7 @@ class Trials:
         pending: ArrayLike,
         numbers: ArrayLike | None,
         outputs: ArrayLike | None = None,
+        executions: ArrayLike | None = None,
     ) -> None:
         """Take over trials whose inputs are points of the unit cube, as they are."""
         d = self._box.dimension
@@ -230,12 +246,19 @@ class Trials:
                 f"outputs have shape {measured.shape}; give one finite number, or NaN, for each of {len(inputs)} "
                 f"trials and {len(self.limits)} constraints."
             )
+        of = np.ones(len(inputs), dtype=np.intp) if executions is None else np.asarray(executions)
+        if of.shape != values.shape or (len(of) and (of.dtype.kind not in "iu" or np.any(of < 1))):
+            raise InputError(f"of is {executions!r}; give a whole number of executions, 1 or more, for each trial.")
+        whole = np.abs(of * values - np.round(of * values)) < 1e-6
+        if self._counted and not np.all((values >= 0.0) & (values <= 1.0) & whole):
+            raise InputError("y holds a number that is no share of successes; give successes divided by executions.")
         total = len(inputs) + len(waiting)
         given = np.arange(total) if numbers is None or total == 0 else np.asarray(numbers)
         whole = given.shape == (total,) and given.dtype.kind in "iu" and np.all(given >= 0)
         if not whole or len(np.unique(given)) < total:
             raise InputError(f"numbers are {numbers!r}; give {total} different whole numbers, those pending last.")
         self._outputs = [tuple(row) for row in measured.tolist()]
+        self._executions = of.tolist()
         self._commanded, self._reached = list(inputs), list(actual)
         self._values, self._numbers = values.tolist(), given[: len(values)].tolist()
         self._pending = dict(zip(given[len(values) :].tolist(), waiting, strict=True))
@@ -247,6 +270,7 @@ class Trials:
             and np.array_equal(self.commanded, other.commanded)
             and np.array_equal(self.reached, other.reached)
             and np.array_equal(self.outputs, other.outputs, equal_nan=True)
+            and np.array_equal(self.executions, other.executions)
         )
 
     def of_output(self, k: int) -> "Trials":

@@ -23,6 +23,7 @@ from surehold.studies.recommendation import StudyRecommendation, find_recommenda
 from surehold.studies.settings import SETTINGS, StudySettings
 from surehold.studies.stop_rule import StopRule
 from surehold.studies.storage import Storage, checked_name, open_storage
+from surehold.studies.success import answer
 
 __all__ = ["Asked", "NothingToAsk", "RobotStudy"]
 
@@ -218,7 +219,7 @@ class RobotStudy:
         id
             Of the trial, as `ask` gave it.
         value
-            Finite; larger is better.
+            Finite; larger is better. Of a study about success: "success" or "failure", or True or False.
         failed
             Whether the trial gave nothing; then there is no value.
         reached
@@ -233,7 +234,9 @@ class RobotStudy:
             before. What was told before stays.
         """
         with self.storage.failures():
-            return self._ledger.tell(id, value, failed, reached, self._checked(constraints, failed))
+            return self._ledger.tell(
+                id, answer(self.settings.optimizer, value), failed, reached, self._checked(constraints, failed)
+            )
 
     def _checked(self, constraints: Mapping[str, Any] | None, failed: bool) -> dict[str, float]:
         limits = limits_of(self.settings.optimizer.get("constraints"))
@@ -251,7 +254,7 @@ class RobotStudy:
         note: str = "added by hand",
     ) -> int:
         """Store a trial that was made without being asked for, and return its id; arguments as in `tell`."""
-        number = checked_value(value, failed)
+        number = checked_value(answer(self.settings.optimizer, value), failed)
         commanded = self.settings.space.check(parameters)
         marks: dict[str, Any] = {NOTE: note}
         if reached is not None:

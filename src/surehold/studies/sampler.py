@@ -225,7 +225,8 @@ class Sampler(BaseSampler):
         return self._space
 
     def _surrogate_for(self, trials: int) -> str | Surrogate | None:
-        return "tgp" if self._surrogate is None and trials >= _MANY else self._surrogate
+        many = trials >= _MANY and self._settings.get("outcome") != "success"
+        return "tgp" if self._surrogate is None and many else self._surrogate
 
     def _new_optimizer(self, space: SearchSpace, trials: int, direction: str) -> Optimizer:
         if space.box is None:

@@ -3,7 +3,7 @@
 Unknown fields, text in place of numbers, and numbers that are not finite are refused.
 """
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -28,7 +28,10 @@ def _whole(value: Any) -> Any:
 
 
 _Id = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=2**31 - 1, description="Of the trial, as ask gave it.")]
-_Value = Annotated[float | None, Field(allow_inf_nan=False, description="Outcome, larger is better.")]
+_Value = Annotated[
+    float | Literal["success", "failure"] | None,
+    Field(allow_inf_nan=False, description="Outcome, larger is better; or success or failure."),
+]
 _Text = Annotated[str, Field(max_length=2000)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Outputs = Annotated[dict[str, _Finite | None] | None, Field(description="Further outputs by name.")]

@@ -13,6 +13,7 @@ from surehold.optimization.strategy.expected_improvement import ExpectedImprovem
 from surehold.optimization.strategy.protocol import Strategy
 from surehold.optimization.strategy.ranking import Ranking
 from surehold.optimization.strategy.risk import RiskAverse
+from surehold.optimization.strategy.success import SuccessImprovement
 from surehold.optimization.strategy.thesis import ThesisConstants, ThesisImprovement
 from surehold.optimization.strategy.thompson import Thompson
 from surehold.optimization.strategy.trust_region import TrustRegion
@@ -34,6 +35,7 @@ def strategy_named(
     trust_region: TrustRegion | None,
     thesis: ThesisConstants | None,
     allowed: Allowed | None = None,
+    outcome: str = "value",
 ) -> Strategy:
     """Return the strategy of these settings, as of `Optimizer`; `noisy`: whether observations carry noise.
 
@@ -74,6 +76,8 @@ def strategy_named(
                     f"{setting} chooses trials in another way than the thesis does; leave it out, or the preset."
                 )
         return ThesisImprovement(ranking, name, thesis.margin, float(kappa))
+    if outcome == "success":
+        return Covering(SuccessImprovement(ranking), exactly=input_noise is None)
     exactly = name.scale == "exact" and not averse
     strategy: Strategy
     if averse:

@@ -1,0 +1,124 @@
+"""Trials that only succeed or fail: the true probability of what is recommended, calibration, and the time of an ask.
+
+`python -m benchmarks.success_outcomes [--seeds 20] [--trials 40] [--problems rkhs,gm,nes-polynomial]`
+
+A function of a shipped problem, standardized over its box, becomes a probability, p(x) = Phi(2.5 z(x)). Methods:
+success (`outcome="success"`), values (a Gaussian process with inferred noise told zeros and ones), tpe (Optuna's, which
+recommends its first success), random (random inputs, recommended by the success model).
+"""
+
+import argparse
+import time
+
+import numpy as np
+from scipy.special import ndtr
+
+import surehold as sh
+from surehold.problems.named import named_function
+
+BUDGETS = (20, 40, 80)
+
+
+def probability_of(name):
+    """Return the box of a problem and p: (q, d) -> (q,)."""
+    problem = named_function(name)
+    box = problem.box
+    points = box.from_unit(np.random.default_rng(0).random((4096, box.dimension)))
+    values = np.array([problem(x) for x in points])
+    return box, lambda x: float(ndtr(2.5 * (problem(x) - values.mean()) / values.std()))
+
+
+def surehold_run(method, box, p, seed, budgets):
+    """Return the probability at the recommended input after each budget, and (predicted, happened) of each ask."""
+    settings = {"outcome": "success"} if method != "values" else {"noise": "inferred"}
+    optimizer, rng, found, calibration = sh.Optimizer(box, seed=seed, **settings), np.random.default_rng(seed), [], []
+    for t in range(budgets[-1]):
+        x = box.from_unit(rng.random(box.dimension)) if method == "random" else optimizer.ask()
+        happened = bool(rng.random() < p(x))
+        if method == "success" and t >= optimizer.n_initial:
+            calibration.append((float(optimizer.predict(x[None])[0][0]), happened))
+        if method == "values":
+            optimizer.tell(x, float(happened))
+        else:
+            optimizer.tell(x, success=happened)
+        if t + 1 in budgets:
+            found.append(p(optimizer.recommend().x))
+    return found, calibration
+
+
+def tpe_run(box, p, seed, budgets):
+    """Return the probability at the recommended input after each budget."""
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    rng, found = np.random.default_rng(seed), []
+    study = optuna.create_study(direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed))
+    for t in range(budgets[-1]):
+        trial = study.ask()
+        x = np.array([trial.suggest_float(n, a, b) for n, a, b in zip(box.names, box.lower, box.upper, strict=True)])
+        study.tell(trial, float(rng.random() < p(x)))
+        if t + 1 in budgets:
+            found.append(p(np.array([study.best_params[n] for n in box.names])))
+    return found
+
+
+def ask_seconds(n=100, d=3):
+    """Return seconds of one ask with n trials, learning included: success, and plain."""
+    X = np.random.default_rng(0).random((n, d))
+    box = sh.Box({f"x{i}": (0.0, 1.0) for i in range(d)})
+    z = 1.0 - 4.0 * ((X - 0.5) ** 2).sum(axis=1)
+    happened = (np.random.default_rng(1).random(n) < ndtr(2.0 * z)).astype(float)
+    seconds = []
+    for settings, y in (({"outcome": "success"}, happened), ({}, z)):
+        taken = []
+        for seed in range(6):  # the first compiles
+            optimizer = sh.Optimizer(box, seed=seed, **settings)
+            optimizer.restore(X, y)
+            started = time.process_time()
+            optimizer.ask()
+            taken.append(time.process_time() - started)
+        seconds.append(np.median(taken[1:]))
+    return seconds
+
+
+def main():
+    """Print all tables."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--trials", type=int, default=40)
+    parser.add_argument("--no-time", action="store_true", help="leave the time of an ask out")
+    parser.add_argument("--problems", default="rkhs,gm,nes-polynomial")
+    arguments = parser.parse_args()
+    success, plain = (np.nan, np.nan) if arguments.no_time else ask_seconds()
+    print(
+        f"ask at n = 100, d = 3: success {success:.3f} s CPU, plain {plain:.3f} s, ratio {success / plain:.1f}",
+        flush=True,
+    )
+    budgets = tuple(b for b in BUDGETS if b <= arguments.trials)
+    pairs = []
+    for name in arguments.problems.split(","):
+        box, p = probability_of(name)
+        results = {}
+        for seed in range(arguments.seeds):
+            for method in ("success", "values", "tpe", "random"):
+                if method == "tpe":
+                    found = tpe_run(box, p, seed, budgets)
+                else:
+                    found, calibration = surehold_run(method, box, p, seed, budgets)
+                    pairs += calibration
+                results.setdefault(method, []).append(found)
+                print(f"{name} seed {seed} {method}: {np.round(found, 4).tolist()}", flush=True)
+        for method, found in results.items():
+            table = np.array(found)
+            error = table.std(axis=0, ddof=1) / np.sqrt(len(table))
+            cells = "  ".join(f"{m:.3f} +- {e:.3f}" for m, e in zip(table.mean(axis=0), error, strict=True))
+            print(f"{name:16s} {method:8s} after {budgets}: {cells}  ({len(table)} seeds)", flush=True)
+    predicted, happened = np.array(pairs).T
+    for k in range(10):
+        inside = (predicted >= k / 10) & (predicted < (k + 1) / 10)
+        if inside.sum() > 1:
+            print(f"predicted {predicted[inside].mean():.3f}: happened {happened[inside].mean():.3f} of {inside.sum()}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Success and failure: a Gaussian process behind a probit likelihood."""

@@ -1,0 +1,123 @@
+"""Binary outcomes as a surrogate: a Gaussian process behind a probit likelihood, hyperparameters slice-sampled."""
+
+from collections import OrderedDict
+from math import log, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.defaults import (
+    LENGTH_SCALE_DEVIATION,
+    LENGTH_SCALE_MEDIAN,
+    NUGGET,
+    PARTICLES,
+    SUCCESS_BURN_IN,
+    SUCCESS_MEAN_VARIANCE,
+    SUCCESS_SIGNAL_PRIOR,
+    THIN,
+)
+from surehold.errors import InputError
+from surehold.optimization.samplers.elliptical_slice import elliptical_slice_sample
+from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
+from surehold.optimization.surrogates.gaussian_process.model import fingerprint, learnt_from
+from surehold.optimization.surrogates.protocol import Posterior
+from surehold.optimization.surrogates.success.laplace import Counts, log_posterior
+from surehold.optimization.surrogates.success.posterior import SuccessPosterior
+
+__all__ = ["SuccessProcess"]
+
+_REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
+
+
+class SuccessProcess:
+    """A Gaussian process behind a probit likelihood, for trials that succeed or fail (Tesch et al. 2013, model only).
+
+    Laplace's approximation for given hyperparameters, which are integrated out by slice sampling on its evidence; a
+    constant mean of prior N(0, 1) is integrated out exactly.
+
+    Parameters
+    ----------
+    kernel
+        As of `GaussianProcess`.
+    length_scales
+        Fixed length-scales (d,) in box widths, together with `signal_variance`; None (default) learns both.
+    signal_variance
+        Fixed variance of the latent function, in probit units.
+    """
+
+    def __init__(
+        self,
+        *,
+        kernel: str = "matern52",
+        length_scales: NDArray[np.float64] | None = None,
+        signal_variance: float | None = None,
+        mean_variance: float = SUCCESS_MEAN_VARIANCE,
+    ):
+        self._kernel = kernel_number(kernel)
+        if (length_scales is None) != (signal_variance is None):
+            raise InputError("length_scales and signal_variance of a SuccessProcess are fixed together or not at all.")
+        self._fixed = (
+            None
+            if length_scales is None or signal_variance is None
+            else np.log(np.append(np.asarray(length_scales, dtype=np.float64), signal_variance))
+        )
+        self._mean_variance = mean_variance
+        self._learnt: OrderedDict[bytes, tuple[NDArray[np.float64], int]] = OrderedDict()  # saves time, changes nothing
+
+    @property
+    def noisy(self) -> bool:
+        """Observations carry noise: True."""
+        return True
+
+    def condition(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        rng: np.random.Generator,
+        previous: Posterior | None = None,
+        trials: NDArray[np.float64] | None = None,
+    ) -> SuccessPosterior:
+        """Learn from X (n, d) in the unit cube and shares of success y (n,) of `trials` (n,), 1 each by default.
+
+        Hyperparameters are learnt anew after every sixteenth part of the trials, as those of `GaussianProcess`.
+        """
+        of = np.ones(len(y)) if trials is None else np.asarray(trials, dtype=np.float64)
+        counts = self._counts(X, y * of, of)
+        if self._fixed is not None:
+            return SuccessPosterior(counts, self._fixed[None, :], 0)
+        stream, k = int(rng.integers(2**63)), learnt_from(len(y))
+        key = fingerprint(X[:k], y[:k], of[:k], stream)
+        if key not in self._learnt:
+            early = self._counts(X[:k], (y * of)[:k], of[:k])
+            samples = elliptical_slice_sample(
+                log_posterior,
+                early,
+                early.prior_mean,
+                np.diag(early.prior_deviation),
+                np.random.default_rng([stream, k]),
+                keep=PARTICLES,
+                burn_in=SUCCESS_BURN_IN,
+                thin=THIN,
+            )
+            self._learnt[key] = samples.states, samples.evaluations
+            while len(self._learnt) > _REMEMBERED:
+                self._learnt.popitem(last=False)
+        return SuccessPosterior(counts, *self._learnt[key])
+
+    def _counts(self, X: NDArray[np.float64], successes: NDArray[np.float64], trials: NDArray[np.float64]) -> Counts:
+        """Return the data, trials of the same input put together."""
+        places, which = np.unique(X, axis=0, return_inverse=True)
+        d = X.shape[1]
+        prior = [(log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION)] * d + [SUCCESS_SIGNAL_PRIOR]
+        mean, deviation = np.array(prior).T
+        return Counts(
+            np.ascontiguousarray(places, dtype=np.float64),
+            np.bincount(which.ravel(), successes, len(places)).astype(np.float64),
+            np.bincount(which.ravel(), trials, len(places)).astype(np.float64),
+            np.ascontiguousarray(mean),
+            np.ascontiguousarray(deviation),
+            NUGGET,
+            self._mean_variance,
+            self._kernel,
+        )
