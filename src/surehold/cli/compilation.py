@@ -41,13 +41,15 @@ def announced(console: Console) -> Iterator[None]:
         console.print(f"Compiled and stored in {seconds:.1f} s.")
 
 
-def warm_up(problem: Any, settings: dict[str, Any]) -> None:
-    """Run a few trials of a trivial problem with the same settings, and the problem's own warm-up if it has one."""
-    from surehold.optimization.maximization import maximize
+def warm_up(problem: Any, settings: dict[str, Any], console: Console) -> None:
+    """Compile what the problem's trials need; a child process compiles the optimizer's kernels meanwhile."""
+    from surehold.optimization.optimizer import Optimizer
+    from surehold.store.background import compiling
 
+    Optimizer(problem.box, **settings)  # which begins the compilation
+    if compiling() and not _said:
+        console.print("Compiling numerical kernels meanwhile, once for this installation (half a minute) ...")
+        _said.append(True)
     own: Callable[[], Any] | None = getattr(problem, "warm_up", None)
     if own is not None:
         own()
-    few = {**settings, "n_initial": 4}
-    center = problem.box.from_unit([0.5] * problem.box.dimension)
-    maximize(lambda x: -float(sum(((x - center) / problem.box.widths) ** 2)), problem.box, 6, progress=False, **few)

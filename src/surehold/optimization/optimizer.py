@@ -17,6 +17,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
+from surehold.optimization.compilation import compile_ahead
 from surehold.optimization.lattice import Lattice, with_fixed
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
@@ -207,6 +208,7 @@ class Optimizer:
         rest = initial_design(design, max(self.n_initial - len(first), 1), box.dimension, rng)
         self._design = np.concatenate([first, rest])
         self._trials = Trials(box)
+        compile_ahead(given)
 
     @staticmethod
     def default_n_initial(box: Box, variables: int | None = None) -> int:
