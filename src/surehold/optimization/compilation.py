@@ -90,3 +90,4 @@ def _short_run(told: Mapping[str, Any]) -> None:
         optimizer.tell(x, float(1.0 - (x[0] - 0.3) ** 2 - abs(x[1] - 0.6)))
     optimizer.ask(2)
     optimizer.recommend()
+    optimizer.promise()
