@@ -20,6 +20,11 @@ from typing import Final
 #: Trials of the initial design for each variable, and their least number. Never measured.
 DESIGN_PER_VARIABLE: Final = 5
 DESIGN_LEAST: Final = 6
+#: The most trials of the initial design: so many, and one more for so many variables each. It counts from five
+#: variables on: a model of 100 variables learns which of them matter from 40 trials better than from 500, most of which
+#: are lost. surehold campaign run high-dimension
+DESIGN_MOST: Final = 20
+DESIGN_VARIABLES_PER_MORE: Final = 5
 
 # --- which tried inputs are the best ones -----------------------------------------------------------------------------
 
@@ -102,6 +107,10 @@ CANDIDATES: Final = 256
 #: from its flank, hardly by chance. Never measured on their own.
 COPY_SCALES: Final = (0.1, 0.03, 0.01, 0.003)
 COPIES: Final = 8
+#: Variables of an anchor that its copies change, about, where there are more: among many, a point that differs in all
+#: of them is far away from everything (Regis and Shoemaker 2013; Papenmeier et al. 2025).
+#: surehold campaign run high-dimension
+FEW_VARIABLES: Final = 20
 #: Gradient ascents from the best candidates, and the least distance between two of their starts, in box widths.
 #: Never measured on their own.
 STARTS: Final = 4

@@ -12,7 +12,14 @@ from typing import Any, Final, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.defaults import DESIGN_LEAST, DESIGN_PER_VARIABLE, KAPPA, OUTCOME_EXPONENT
+from surehold.defaults import (
+    DESIGN_LEAST,
+    DESIGN_MOST,
+    DESIGN_PER_VARIABLE,
+    DESIGN_VARIABLES_PER_MORE,
+    KAPPA,
+    OUTCOME_EXPONENT,
+)
 from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
@@ -66,7 +73,8 @@ class Optimizer:
         maximum of a function, or of its outcome, drawn from the posterior). By default "log_ei" without and
         "robust_log_ei" with input noise; in the thesis presets "ei" and "uei".
     n_initial
-        Trials of the initial design; by default 5 for each variable that is not fixed, at least 6.
+        Trials of the initial design; by default 5 for each of the d variables that are not fixed, at least
+        6 and at most 20 + d/5.
     initial_points
         Points to be tried first, (i, d) or a list of whatever `tell` takes as x; they count as trials of the initial
         design, whose rest follows.
@@ -212,11 +220,12 @@ class Optimizer:
 
     @staticmethod
     def default_n_initial(box: Box, variables: int | None = None) -> int:
-        """Return the size of the initial design where none is given: 5 for each variable, at least 6.
+        """Return the size of the initial design where none is given: 5 for each variable, at least 6, at most 20 + d/5.
 
         `variables` are those that can vary, where the box has others, or several coordinates for one (a choice).
         """
-        return max(DESIGN_LEAST, DESIGN_PER_VARIABLE * (box.dimension if variables is None else variables))
+        d = box.dimension if variables is None else variables
+        return max(DESIGN_LEAST, min(DESIGN_PER_VARIABLE * d, DESIGN_MOST + d // DESIGN_VARIABLES_PER_MORE))
 
     # --- trials -------------------------------------------------------------------------------------------------
 

@@ -65,7 +65,7 @@ class NeighborPosterior:
         """
         found = []
         for (part, tree), count in zip(self._trees, NEIGHBORS, strict=True):
-            rows = tree.query(queries * self._scale, k=range(1, min(count, len(part)) + 1))[1]
+            rows = tree.query(queries * self._scale, k=np.arange(1, min(count, len(part)) + 1))[1]  # pyright: ignore[reportArgumentType]
             found.append(part[rows])
         rows = np.sort(np.concatenate(found, axis=1), axis=1)
         first = np.concatenate([np.ones((len(rows), 1), dtype=bool), rows[:, 1:] != rows[:, :-1]], axis=1)
@@ -121,7 +121,7 @@ class NeighborPosterior:
 
         The points of a query are drawn given the nearest trials of each of them.
         """
-        m, (q, s, d) = len(self._Y), points.shape
+        m, (q, s, _) = len(self._Y), points.shape
         draws = np.empty((m, q, *normals.shape))
         for i in range(q):
             rows = np.unique(self.nearest(points[i])[0][:, :: max(1, s * sum(NEIGHBORS) // _SAMPLED)])
