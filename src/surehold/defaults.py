@@ -107,10 +107,6 @@ CANDIDATES: Final = 256
 #: from its flank, hardly by chance. Never measured on their own.
 COPY_SCALES: Final = (0.1, 0.03, 0.01, 0.003)
 COPIES: Final = 8
-#: Variables of an anchor that its copies change, about, where there are more: among many, a point that differs in all
-#: of them is far away from everything (Regis and Shoemaker 2013; Papenmeier et al. 2025).
-#: surehold campaign run high-dimension
-FEW_VARIABLES: Final = 20
 #: Gradient ascents from the best candidates, and the least distance between two of their starts, in box widths.
 #: Never measured on their own.
 STARTS: Final = 4

@@ -13,6 +13,8 @@ from typing import Any, Final
 
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.surrogates.gaussian_process.likelihood import log_posterior
+from surehold.optimization.surrogates.gaussian_process.neighbors import NeighborPosterior
+from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 from surehold.store import background
 
 __all__ = ["compile_ahead", "compile_now", "essentials"]
@@ -91,3 +93,7 @@ def _short_run(told: Mapping[str, Any]) -> None:
     optimizer.ask(2)
     optimizer.recommend()
     optimizer.promise()
+    few = optimizer.posterior
+    if isinstance(few, GaussianProcessPosterior):  # what becomes of it when there are many trials
+        many = NeighborPosterior(few.evidence, few.hyperparameters.theta, few.outputs, 0)
+        many.moments(optimizer.X, gradient=True)

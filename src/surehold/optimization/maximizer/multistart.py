@@ -8,7 +8,6 @@ from surehold.defaults import (
     CANDIDATES_IN_REGIONS,
     COPIES,
     COPY_SCALES,
-    FEW_VARIABLES,
     START_DISTANCE,
     STARTS,
     STARTS_IN_REGIONS,
@@ -53,19 +52,13 @@ def multistart(
 def promising(
     dimension: int, anchors: NDArray[np.float64], rng: np.random.Generator, regions: Regions
 ) -> NDArray[np.float64]:
-    """Return points (c, d) where a maximum may be: a Sobol sequence, another in every region, copies of the anchors.
-
-    Among many variables half of the copies differ from their anchor in a few of them.
-    """
+    """Return points (c, d) where a maximum may be: a Sobol sequence, another in every region, copies of the anchors."""
     from scipy.stats import qmc
 
     lower, upper = regions.lower.min(axis=0), regions.upper.max(axis=0)
     candidates = [lower + (upper - lower) * qmc.Sobol(dimension, rng=rng).random(CANDIDATES)]
     for scale in COPY_SCALES:
         noise = scale * (upper - lower) * rng.standard_normal((COPIES, *anchors.shape))
-        if dimension > FEW_VARIABLES:  # half of the copies, for some functions depend on all of their variables
-            some = rng.random(noise[::2].shape) < FEW_VARIABLES / dimension
-            noise[::2] = np.where(some, noise[::2], 0.0)
         candidates.append(np.clip(anchors + noise, lower, upper).reshape(-1, dimension))
     if len(regions.lower) > 1:
         inside = qmc.Sobol(dimension, rng=rng).random(CANDIDATES_IN_REGIONS)[
