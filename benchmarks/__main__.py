@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks import growth, stored, suggestion_time
 from surehold.campaigns.methods import Surehold
 from surehold.campaigns.peers import installed_peers
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems import GraspProblem
 
 GRASPS = 200
@@ -20,7 +21,7 @@ GRASPS = 200
 
 def suggestions(quick):
     """Yield name and median CPU seconds of an ask, ours and peers'."""
-    ours = {"gp": (None, {}), "gp, input noise": (0.05, {})}
+    ours = {"gp": (None, {}), "gp, input noise": (InputNoise.unit(0.05), {})}
     makers = {f"surehold {name}": (lambda d, X, seed, s=s: Surehold(d, X, seed, *s)) for name, s in ours.items()}
     for name, maker in {**makers, **({} if quick else installed_peers())}.items():
         for n, d in suggestion_time.SETTINGS:

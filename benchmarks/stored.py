@@ -1,6 +1,6 @@
 """One table of all short benchmarks, stored with the machine's yardstick and compared with the one stored before.
 
-`python -m benchmarks` (which `make bench` runs) writes results/benchmarks/DATE.json. Times are CPU seconds; between runs
+`python -m benchmarks` (what `make bench` runs) writes results/benchmarks/DATE.json. Times are CPU seconds; between runs
 they are compared in units of the yardstick, the time of LAPACK dpotrf on a 140 x 140 matrix in the same run, so that a
 slower hour of a shared machine is no loss.
 """
