@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from surehold.campaigns.methods import Surehold
 from surehold.campaigns.peers import installed_peers
+from surehold.optimization.noise.input_noise import InputNoise
 
 SETTINGS = ((50, 2), (140, 2), (150, 7))
 ASKS = 12
@@ -57,9 +58,9 @@ def seconds_per_ask(maker, n, d):
 def main():
     ours = {
         "surehold gp": (None, {}),
-        "surehold gp, input noise": (0.05, {}),
+        "surehold gp, input noise": (InputNoise.unit(0.05), {}),
         "surehold tgp": (None, {"surrogate": "tgp"}),
-        "surehold tgp, input noise": (0.05, {"surrogate": "tgp"}),
+        "surehold tgp, input noise": (InputNoise.unit(0.05), {"surrogate": "tgp"}),
     }
     makers = {name: (lambda d, initial, seed, s=told: Surehold(d, initial, seed, *s)) for name, told in ours.items()}
     with threadpool_limits(1):

@@ -20,6 +20,11 @@ from typing import Final
 #: Trials of the initial design for each variable, and their least number. Never measured.
 DESIGN_PER_VARIABLE: Final = 5
 DESIGN_LEAST: Final = 6
+#: The most trials of the initial design: so many, and one more for so many variables each. It counts from five
+#: variables on: a model of 100 variables learns which of them matter from 40 trials better than from 500, most of which
+#: are lost. surehold campaign run high-dimension
+DESIGN_MOST: Final = 20
+DESIGN_VARIABLES_PER_MORE: Final = 5
 
 # --- which tried inputs are the best ones -----------------------------------------------------------------------------
 
@@ -30,6 +35,9 @@ ANCHORS: Final = 3
 #: coarse ranking need only place the best input among the first 16. Never measured on its own; what a quadrature's
 #: ranking loses: python -m benchmarks.quadrature_error.
 SHORTLIST: Final = 16
+#: Of more tried inputs than this only those with the highest values are ranked by their outcome: an ask takes the same
+#: time whether there are a thousand or ten thousand. Never measured against other numbers; python -m benchmarks.growth.
+CONTENDERS: Final = 400
 #: The coarse ranking, and the choice of the ascents' starts, use every (m // 3)-th of the m particles: numbers 0, 3, 6
 #: and 9 of the default 10, which are four. It saves time: python -m benchmarks.suggestion_time. Its effect on the
 #: result was never measured.
@@ -175,6 +183,13 @@ CURVATURE_STEP: Final = 0.05
 #: measured.
 RELEARNT_DIVISOR: Final = 16
 SURPRISE: Final = 4.0
+#: Trials up to which a process takes all of them together: its cost grows with their cube. Beyond, hyperparameters are
+#: learnt from about so many of them. python -m benchmarks.growth
+MANY: Final = 400
+MANY_LEARNT: Final = 200
+#: Trials that a query is then answered from: the nearest of all, of every eighth, of every 64th.
+#: python -m benchmarks.growth
+NEIGHBORS: Final = (36, 12, 8)
 #: Observation noise that varies: median length-scale of its logarithm over sqrt(d) box widths, standard deviation of
 #: that in logarithms, prior of its variance; rounds, the change of the logarithm that ends them, and the largest step
 #: at one observation. Never measured.

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
+from surehold.campaigns.embedded import EMBEDDED
 from surehold.campaigns.methods import METHODS, build_method
 from surehold.campaigns.peers import PEERS, REQUIRES, installed_peers
 from surehold.campaigns.plan import MethodSetup, Plan, ProblemSetup
@@ -27,7 +28,8 @@ def test_every_method_asks_first_for_the_design_and_answers_with_a_good_point(na
         u = np.asarray(method.ask())
         asked.append(u)
         method.tell(u, hill(u))
-    assert np.array(asked[:6]) == pytest.approx(initial)
+    if name not in EMBEDDED:  # whose design lies in a subspace
+        assert np.array(asked[:6]) == pytest.approx(initial)
     assert np.all((np.array(asked) >= 0.0) & (np.array(asked) <= 1.0))
     answer = np.asarray(method.answer())
     assert answer.shape == (2,)

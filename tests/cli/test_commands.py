@@ -250,6 +250,19 @@ def test_a_run_without_any_grasp_says_so_first(here, capsys):
     assert "No success: " in page
 
 
+def test_doctor_compiles_for_images(capsys, monkeypatch):
+    from surehold.optimization import compilation
+    from surehold.optimization.surrogates.named import SURROGATES
+
+    told = []
+    # The runs themselves are tested beside `compilation`; all of them take two minutes.
+    monkeypatch.setattr(compilation, "_compile", lambda key, settings: told.append(settings))
+    assert run(["doctor", "--warm"]) == 0
+    assert {settings["surrogate"] for settings in told} >= set(SURROGATES)
+    assert {settings["input_noise"] for settings in told} == {"", "constant"}
+    assert "compiled kernels" in capsys.readouterr().out
+
+
 def test_doctor_version_and_help(capsys):
     assert run(["doctor"]) == 0
     out = capsys.readouterr().out

@@ -9,6 +9,7 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 from optuna.trial import TrialState, create_trial
 
 import surehold as sh
+from surehold.defaults import MANY
 from surehold.errors import InputError
 from surehold.studies.search_space import SearchSpace
 
@@ -146,6 +147,7 @@ def test_infinite_values_count_as_failed_and_foreign_trials_are_left_out():
 def test_conditional_spaces_fall_back_with_a_warning(caplog):
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     optuna.logging.enable_propagation()
+    optuna.logging.set_verbosity(optuna.logging.INFO)
     try:
         study = new(sh.Sampler({"x": (0.0, 1.0)}, seed=0))
         one = study.ask()
@@ -201,14 +203,18 @@ def test_only_one_value_is_no_optimization_but_a_trial():
         study.sampler.optimizer(study)
 
 
-def test_many_trials_are_carried_by_a_tree():
-    sampler = sh.Sampler({"x": (0.0, 1.0)}, seed=0)
-    study = new(sampler)
-    space = {"x": FloatDistribution(0.0, 1.0)}
-    for x in np.random.default_rng(0).random(450):
-        study.add_trial(create_trial(params={"x": x}, distributions=space, value=float(np.sin(9 * x))))
-    assert sampler.optimizer(study).posterior.diagnostics.partition.leaves > 1
-    assert 0.0 <= study.ask(space).params["x"] <= 1.0
+def test_many_trials_keep_the_surrogate_and_its_convergence(caplog):
+    space = {f"x{i}": FloatDistribution(0.0, 1.0) for i in range(6)}
+    top = np.linspace(0.2, 0.8, 6)
+    study = new(sh.Sampler(space, seed=0))
+    tried = np.random.default_rng(0).random((MANY + 1, 6))
+    values = -np.square(tried - top).sum(axis=1)
+    for x, value in zip(tried.tolist(), values.tolist(), strict=True):
+        study.add_trial(create_trial(params=dict(zip(space, x, strict=True)), distributions=space, value=value))
+    with caplog.at_level("WARNING", logger="surehold"):
+        run(study, 6, space, lambda p: -float(np.square(np.array(list(p.values())) - top).sum()))
+    assert caplog.text.count(f"more than {MANY} trials") == 1
+    assert study.best_value > 0.02 * values.max(), "a tree's leaves take back what all trials together have taught"
 
 
 def test_a_choice_counts_as_one_variable_in_the_size_of_the_design():
@@ -219,11 +225,11 @@ def test_a_choice_counts_as_one_variable_in_the_size_of_the_design():
         "only": IntDistribution(3, 3),
     }
     sampler = sh.Sampler(space, seed=0)
-    assert sampler.n_initial(SearchSpace(space)) == 25
+    assert sampler.n_initial(SearchSpace(space)) == 21
     study = new(sampler)
     asked = run(study, 26, space, lambda p: -abs(p["T"] - 108.0) - (p["s"] != "a"))
     assert len(asked) == 26
-    assert sampler.optimizer(study).n_initial == 25
+    assert sampler.optimizer(study).n_initial == 21
 
 
 def test_input_noise_that_is_a_number_names_the_right_call():

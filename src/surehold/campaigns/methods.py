@@ -9,6 +9,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.campaigns.embedded import EMBEDDED
 from surehold.campaigns.peers import PEERS, REQUIRES, installed_peers
 from surehold.campaigns.plan import Cell
 from surehold.campaigns.problem_setup import robust_problem_of, unit_noise_of
@@ -25,13 +26,13 @@ from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, l
 __all__ = ["METHODS", "Method", "build_method", "checked_method", "checked_settings"]
 
 #: Optimizers that a plan may name.
-METHODS: Final = ("surehold", *PEERS)
+METHODS: Final = ("surehold", *EMBEDDED, *PEERS)
 _ROBUST: Final = ("surehold", "botorch")  # those that can be told of the input noise
 _TREE: Final = ("min_leaf", "weight_power", "trees")
 _PROCESS: Final = ("noise", "output_range")
 _SETTINGS: Final = (
     *("preset", "surrogate", "criterion", *_TREE, *_PROCESS),
-    *("risk", "alpha", "beta", "quadrature", "k", "border", "kappa"),
+    *("risk", "alpha", "beta", "quadrature", "k", "border", "kappa", "trust_region"),
 )
 
 
@@ -112,6 +113,8 @@ def build_method(cell: Cell, dimension: int, initial: NDArray[np.float64], seed:
             {} if asked is None or asked.risk == "mean" else {n: getattr(asked, n) for n in ("risk", "alpha", "beta")}
         )
         return Surehold(dimension, initial, seed, noise, {**risk, **told["settings"]})
+    if cell.by.optimizer in EMBEDDED:
+        return EMBEDDED[cell.by.optimizer](dimension, initial, seed)
     if cell.by.optimizer not in installed_peers():
         missing = ", ".join(REQUIRES[cell.by.optimizer])
         raise InputError(f"method '{cell.method}' needs {missing}; install them: pip install 'surehold[peers]'.")

@@ -41,20 +41,15 @@ def announced(console: Console) -> Iterator[None]:
         console.print(f"Compiled and stored in {seconds:.1f} s.")
 
 
-def warm_up(problem: Any, settings: dict[str, Any]) -> None:
-    """Run a few trials of a trivial problem with the same settings, and the problem's own warm-up if it has one."""
-    from surehold.optimization.maximization import maximize
+def warm_up(problem: Any, settings: dict[str, Any], console: Console) -> None:
+    """Compile what the problem's trials need; a child process compiles the optimizer's kernels meanwhile."""
+    from surehold.optimization.optimizer import Optimizer
+    from surehold.store.background import compiling
 
+    Optimizer(problem.box, **settings)  # which begins the compilation
+    if compiling() and not _said:
+        console.print("Compiling numerical kernels meanwhile, once for this installation (half a minute) ...")
+        _said.append(True)
     own: Callable[[], Any] | None = getattr(problem, "warm_up", None)
     if own is not None:
         own()
-    few: dict[str, Any] = {
-        name: value for name, value in settings.items() if name not in ("allowed", "constraints")
-    } | {"n_initial": 4}
-    center = problem.box.from_unit([0.5] * problem.box.dimension)
-
-    def hill(x: Any) -> float:
-        value = -float(sum(((x - center) / problem.box.widths) ** 2))
-        return float(value > -0.1) if settings.get("outcome") == "success" else value
-
-    maximize(hill, problem.box, 6, progress=False, **few)

@@ -7,15 +7,23 @@ import platform
 from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 __all__ = ["doctor"]
 
 CORE = ("numpy", "scipy", "numba", "threadpoolctl", "lazy_loader")
 
 
-def doctor() -> None:
+def doctor(
+    warm: Annotated[
+        bool, typer.Option("--warm", help="Compile all kernels into the cache first, as for a container image.")
+    ] = False,
+) -> None:
     """Show versions, caches, compiled kernels and graphics libraries."""
+    if warm:
+        _warm()
     from rich.console import Console
     from rich.table import Table
 
@@ -44,6 +52,39 @@ def doctor() -> None:
     for name, found in graphics_libraries().items():
         table.add_row(name, found or "not found; only needed for still pictures by MuJoCo")
     Console(highlight=False).print(table)
+
+
+def _warm() -> None:
+    """Compile what any named surrogate, strategy and grasp needs; what is in the cache takes a second."""
+    from surehold.cli.terminal import terminal
+    from surehold.extras import missing
+    from surehold.optimization.compilation import compile_now
+    from surehold.optimization.noise.input_noise import InputNoise
+    from surehold.optimization.surrogates.named import SURROGATES
+
+    console = terminal()
+    noise = InputNoise.unit(0.05)
+    paths: list[dict[str, Any]] = [{"surrogate": name} for name in SURROGATES]
+    paths += [{"surrogate": name, "input_noise": noise} for name in SURROGATES]
+    paths += [
+        {"noise": "inferred"},
+        {"noise": "heteroscedastic"},
+        {"criterion": "thompson"},
+        {"criterion": "ei"},
+        {"risk": "cvar", "input_noise": noise},
+        {"preset": "thesis", "input_noise": noise},
+    ]
+    for number, path in enumerate(paths):
+        console.print(f"Compiling {number + 1} of {len(paths)}: {', '.join(map(str, path.values()))}", markup=False)
+        # As an optimizer is given them, with every default.
+        compile_now({"surrogate": "gp", "risk": "mean", "noise_while_exploring": False, "trust_region": False} | path)
+    if not missing("grasp"):
+        from surehold.grasping import CONTACT_MODELS
+        from surehold.problems import GraspProblem
+
+        for contact in CONTACT_MODELS:
+            console.print(f"Compiling grasps: {contact}", markup=False)
+            GraspProblem("mug", contact=contact).warm_up()
 
 
 def version_of(name: str) -> str | None:

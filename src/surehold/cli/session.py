@@ -141,7 +141,7 @@ def run_session(
             f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), method {method}, seed {seed}"
         )
         with announced(console):
-            warm_up(problem, options)
+            warm_up(problem, options, console)
         if kept is None or not kept.study:
             try:
                 result = _with_progress(problem, trials, options, tolerate_failures, console)

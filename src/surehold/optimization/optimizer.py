@@ -12,11 +12,20 @@ from typing import TYPE_CHECKING, Any, Final, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.defaults import DESIGN_LEAST, DESIGN_PER_VARIABLE, FEASIBLE, KAPPA, OUTCOME_EXPONENT
+from surehold.defaults import (
+    DESIGN_LEAST,
+    DESIGN_MOST,
+    DESIGN_PER_VARIABLE,
+    DESIGN_VARIABLES_PER_MORE,
+    FEASIBLE,
+    KAPPA,
+    OUTCOME_EXPONENT,
+)
 from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
+from surehold.optimization.compilation import compile_ahead
 from surehold.optimization.constraints.input import region_of
 from surehold.optimization.diagnosis import Diagnosis
 from surehold.optimization.lattice import lattice_of
@@ -77,7 +86,8 @@ class Optimizer:
         maximum of a function, or of its outcome, drawn from the posterior). By default "log_ei" without and
         "robust_log_ei" with input noise; in the thesis presets "ei" and "uei".
     n_initial
-        Trials of the initial design; by default 5 for each variable that is not fixed, at least 6.
+        Trials of the initial design; by default 5 for each of the d variables that are not fixed, at least
+        6 and at most 20 + d/5.
     initial_points
         Points to be tried first, (i, d) or a list of whatever `tell` takes as x; they count as trials of the initial
         design, whose rest follows.
@@ -279,14 +289,16 @@ class Optimizer:
             rest = self._requirements.initial(rest, first, rng)
         self._design = np.concatenate([first, rest])
         self._trials = Trials(box, limits, outcome == "success")
+        compile_ahead(given)
 
     @staticmethod
     def default_n_initial(box: Box, variables: int | None = None) -> int:
-        """Return the size of the initial design where none is given: 5 for each variable, at least 6.
+        """Return the size of the initial design where none is given: 5 for each variable, at least 6, at most 20 + d/5.
 
         `variables` are those that can vary, where the box has others.
         """
-        return max(DESIGN_LEAST, DESIGN_PER_VARIABLE * (len(box.variables) if variables is None else variables))
+        d = len(box.variables) if variables is None else variables
+        return max(DESIGN_LEAST, min(DESIGN_PER_VARIABLE * d, DESIGN_MOST + d // DESIGN_VARIABLES_PER_MORE))
 
     # --- trials -------------------------------------------------------------------------------------------------
 

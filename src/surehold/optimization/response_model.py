@@ -17,6 +17,7 @@ from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inp
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate
 from surehold.optimization.surrogates.success.model import SuccessProcess
 from surehold.optimization.trials import Trials
+from surehold.store import background
 
 __all__ = ["ResponseModel", "chosen_surrogate"]
 
@@ -101,6 +102,7 @@ class ResponseModel:
             raise InputError("no trial has given a value yet; tell the outcome of at least one.")
         if self._cache is not None and self._cache[0] == t:
             return self._cache[1]
+        background.wait()
         with single_threaded():
             posterior = self._conditioned(trials)
         if self._lattice is not None:

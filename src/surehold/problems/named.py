@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from surehold.errors import unknown_name
+from surehold.problems.high_dimensional import HIGH_DIMENSIONAL
 from surehold.problems.published import PUBLISHED
 from surehold.problems.robust import ROBUST, RobustProblem
 from surehold.problems.synthetic import SYNTHETIC
@@ -12,7 +13,7 @@ __all__ = ["NAMES", "has_own_noise", "named_function", "robust_problem"]
 
 _ROBUST: Final[dict[str, Callable[[], RobustProblem]]] = {**ROBUST, **PUBLISHED}
 #: All names that a plan, a study and the command line understand.
-NAMES: Final = (*SYNTHETIC, *_ROBUST)
+NAMES: Final = (*SYNTHETIC, *_ROBUST, *HIGH_DIMENSIONAL)
 
 
 def robust_problem(name: str) -> RobustProblem:
@@ -40,7 +41,7 @@ def has_own_noise(name: str) -> bool:
 
 
 def named_function(name: str) -> Any:
-    """Return the function of that name, of the thesis or of a robust problem.
+    """Return the function of that name, of the thesis, of a robust problem, or of many variables.
 
     Raises
     ------
@@ -49,6 +50,8 @@ def named_function(name: str) -> Any:
     """
     if name in SYNTHETIC:
         return SYNTHETIC[name]()
+    if name in HIGH_DIMENSIONAL:
+        return HIGH_DIMENSIONAL[name]()
     if name not in _ROBUST:
         raise unknown_name("problem", name, NAMES)
     return _ROBUST[name]().function

@@ -8,7 +8,7 @@ import threading
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from optuna import logging
@@ -18,6 +18,7 @@ from optuna.search_space import IntersectionSearchSpace
 from optuna.study import Study, StudyDirection
 from optuna.trial import FrozenTrial
 
+from surehold.defaults import MANY
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
@@ -28,10 +29,6 @@ from surehold.studies.history import History, history_of
 from surehold.studies.search_space import SearchSpace
 
 __all__ = ["Sampler"]
-
-# A process over all trials costs their cube; the leaves of a tree stay small. Suggesting at 400 trials takes half a
-# second with either.
-_MANY: Final = 400
 
 _log = logging.get_logger(__name__)
 
@@ -52,8 +49,8 @@ class Sampler(BaseSampler):
     seed
         Non-negative integer.
     surrogate
-        As in `Optimizer`; None (default) is its default, and from 400 trials on a treed Gaussian process, which can
-        carry tens of thousands.
+        As in `Optimizer`, whose default None stands for. It carries tens of thousands of trials: from
+        `surehold.defaults.MANY` on a place is judged by the trials near it, which is said once.
     warn_independent_sampling
         Whether to warn when a parameter is drawn at random because it is not in the search space.
     **settings
@@ -97,8 +94,9 @@ class Sampler(BaseSampler):
         else:
             self._space = SearchSpace(search_space)
         self._input_noise = input_noise
-        self._surrogate = surrogate
-        self._settings: dict[str, Any] = {**settings, "seed": seed}
+        given = {} if surrogate is None else {"surrogate": surrogate}
+        self._settings: dict[str, Any] = {**settings, **given, "seed": seed}
+        self._said = False
         self._warn = warn_independent_sampling
         self._common = IntersectionSearchSpace()
         self._kept: tuple[tuple[Any, ...], Optimizer] | None = None  # saves time, changes nothing
@@ -106,9 +104,9 @@ class Sampler(BaseSampler):
         # What is wrong is told now, not at the first trial.
         if self._space is None:
             anything = InputNoise.unit(0.1) if input_noise is not None else None
-            Optimizer(Box.unit(1), input_noise=anything, surrogate=self._surrogate_for(0), **self._settings)
+            Optimizer(Box.unit(1), input_noise=anything, **self._settings)
         elif self._space.box is not None:
-            self._new_optimizer(self._space, 0, "maximize")
+            self._new_optimizer(self._space, "maximize")
 
     # --- Optuna's interface -------------------------------------------------------------------------------------
 
@@ -169,7 +167,7 @@ class Sampler(BaseSampler):
         """
         space = self.search_space(study)
         history = history_of(study.get_trials(deepcopy=False), space, outputs=self.outputs)
-        optimizer = self._new_optimizer(space, len(history.y), direction_of(study))
+        optimizer = self._new_optimizer(space, direction_of(study))
         optimizer.restore(
             history.X, history.y, reached=history.reached, pending=history.pending, outputs=history.outputs
         )
@@ -205,9 +203,12 @@ class Sampler(BaseSampler):
             If every parameter can take one value only.
         """
         with self._lock:
-            key = (tuple(space.distributions.items()), self._surrogate_for(len(history.y)), direction)
+            key = (tuple(space.distributions.items()), direction)
             if self._kept is None or self._kept[0] != key:
-                self._kept = (key, self._new_optimizer(space, len(history.y), direction))
+                self._kept = (key, self._new_optimizer(space, direction))
+            if len(history.y) > MANY and not self._said:
+                self._said = True
+                _log.warning(f"The study has more than {MANY} trials: a place is judged by those near it from now on.")
             optimizer = self._kept[1]
             optimizer.restore(
                 history.X, history.y, reached=history.reached, pending=history.pending, outputs=history.outputs
@@ -224,17 +225,12 @@ class Sampler(BaseSampler):
             raise InputError("the sampler has no search space of its own; give one at its construction.")
         return self._space
 
-    def _surrogate_for(self, trials: int) -> str | Surrogate | None:
-        many = trials >= _MANY and self._settings.get("outcome") != "success"
-        return "tgp" if self._surrogate is None and many else self._surrogate
-
-    def _new_optimizer(self, space: SearchSpace, trials: int, direction: str) -> Optimizer:
+    def _new_optimizer(self, space: SearchSpace, direction: str) -> Optimizer:
         if space.box is None:
             raise InputError("every parameter can take one value only; there is nothing to optimize.")
-        surrogate = self._surrogate_for(trials)
         settings: dict[str, Any] = {**self._settings, "n_initial": self.n_initial(space), "direction": direction}
         settings["allowed"] = allowed_in(space, settings.get("allowed"))
-        return Optimizer(space.box, input_noise=self._input_noise, surrogate=surrogate, **settings)
+        return Optimizer(space.box, input_noise=self._input_noise, **settings)
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_kept": None, "_lock": None}

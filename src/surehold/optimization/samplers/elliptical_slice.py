@@ -113,7 +113,7 @@ def elliptical_slice_sample(
     states = np.empty((keep, center.size))
     log_densities = np.empty(keep)
     vector, matrix, count = types.float64[::1], types.float64[:, ::1], types.int64
-    evaluations = compiled_for(_sample, density, vector, matrix, count, count, matrix, vector)(
+    evaluations = compiled_for(_sample, density, evidence, vector, matrix, count, count, matrix, vector)(
         density,
         evidence,
         np.array(center, dtype=np.float64),

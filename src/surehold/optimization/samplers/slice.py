@@ -91,12 +91,17 @@ def _sample(density, evidence, theta, widths, burn_in, thin, states, log_densiti
     return evaluations
 
 
-def compiled_for(sampler: Any, density: Any, *arguments: Any) -> Any:
+def compiled_for(sampler: Any, density: Any, evidence: Any, *arguments: Any) -> Any:
     """Return `sampler` compiled for densities with the signature of `density` and further `arguments` (types).
+
+    A density that is not compiled yet is compiled for `evidence`: not when its module is imported, which would keep
+    everybody waiting who only wants to see a help text.
 
     The density is passed as a first-class function of one signature, so that one compiled sampler, cached on disk,
     serves every density; left to itself numba would compile the sampler again for each function it is given.
     """
+    if not density.nopython_signatures:
+        density.compile((types.float64[::1], typeof(evidence)))
     return _compiled(sampler, density.nopython_signatures[0], arguments)
 
 
@@ -139,6 +144,6 @@ def slice_sample(
     theta = np.array(start, dtype=np.float64)
     guesses = np.broadcast_to(np.asarray(widths, dtype=np.float64), theta.shape).copy()
     vector, count = types.float64[::1], types.int64
-    sampler = compiled_for(_sample, density, vector, vector, count, count, types.float64[:, ::1], vector)
+    sampler = compiled_for(_sample, density, evidence, vector, vector, count, count, types.float64[:, ::1], vector)
     evaluations = sampler(density, evidence, theta, guesses, burn_in, thin, states, log_densities, rng)
     return SliceSamples(states, log_densities, int(evaluations))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import ANCHORS, SCREENING_DIVISOR, SHORTLIST
+from surehold.defaults import ANCHORS, CONTENDERS, SCREENING_DIVISOR, SHORTLIST
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
 from surehold.optimization.acquisition.scales import Acquisition, CriterionName, Scale
 from surehold.optimization.constraints.admission import Admission
@@ -67,10 +67,15 @@ class Ranking:
     ) -> NDArray[np.intp]:
         """Return the indices of U, the input with the best outcome first.
 
-        Observed values (q,) decide where both inputs and observations are exact.
+        Observed values (q,) decide where both inputs and observations are exact; of many inputs only those with the
+        highest ones are looked at.
         """
         if observed is not None and not self.noisy and self.exact_inputs:
             return np.argsort(-observed, kind="stable")
+        if observed is not None and len(U) > CONTENDERS:
+            by_value = np.argsort(-observed, kind="stable")
+            likely = by_value[:CONTENDERS]
+            return np.concatenate([likely[self.order(posterior, U[likely])], by_value[CONTENDERS:]])
         if self.screened:
             first = _outcomes(posterior.thinned(SCREENING_DIVISOR), self.coarse, U)
         else:
@@ -109,14 +114,14 @@ class Ranking:
         """Return the indices of the tried inputs, best first; `exactly`: as if there were no input noise."""
         if exactly:
             return np.argsort(-self._values(posterior, history), kind="stable")
-        return self.order(posterior, history.tried)
+        return self._order_of_tried(posterior, history)
 
     def incumbent(self, posterior: Posterior, history: History, scale: Scale) -> tuple[Any, NDArray[np.float64]]:
         """Return the value to improve upon, a number or (m, 1), one per particle; and the best tried inputs (a, d)."""
         if scale == "exact":
             values = self._values(posterior, history)
             return float(values.max()), history.tried[np.argsort(-values, kind="stable")[:ANCHORS]]
-        anchors = history.tried[self.order(posterior, history.tried)[:ANCHORS]]
+        anchors = history.tried[self._order_of_tried(posterior, history)[:ANCHORS]]
         if self.risk.name != "mean":
             return float(self.risk_at(posterior, anchors[:1])[0]), anchors
         best = self.accurate.outcome(posterior, anchors[:1]).mean  # (m, 1)
@@ -146,8 +151,23 @@ class Ranking:
         # The same draws at every call: the ranking must not depend on how often it was asked for.
         return RiskImprovement(posterior, self.accurate, self.risk, None, np.random.default_rng(0))
 
+    def _order_of_tried(self, posterior: Posterior, history: History) -> NDArray[np.intp]:
+        many = len(history.tried) > CONTENDERS
+        return self.order(posterior, history.tried, history.observed if many and not self._exact else None)
+
+    @property
+    def _exact(self) -> bool:
+        return not self.noisy and self.exact_inputs
+
     def _values(self, posterior: Posterior, history: History) -> NDArray[np.float64]:
-        return mixture(posterior.moments(history.tried))[0] if self.noisy else history.observed
+        if not self.noisy:
+            return history.observed
+        if len(history.tried) <= CONTENDERS:
+            return mixture(posterior.moments(history.tried))[0]
+        values = np.full(len(history.tried), -np.inf)
+        likely = np.argsort(-history.observed, kind="stable")[:CONTENDERS]
+        values[likely] = mixture(posterior.moments(history.tried[likely]))[0]
+        return values
 
 
 def _outcomes(posterior: Posterior, perturbations: Perturbations, U: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,14 +18,12 @@ from math import exp, inf, log, pi, sqrt
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from surehold.defaults import LOCAL_GLOBAL_BURN_IN, NUGGET, PARTICLES, SURPRISE
 from surehold.optimization.numerics.cholesky import cholesky, solve_lower
 from surehold.optimization.samplers.slice import SliceSamples, slice_sample
 from surehold.optimization.surrogates.gaussian_process.kernels import correlation_and_factor, self_correlation
-from surehold.optimization.surrogates.gaussian_process.likelihood import EVIDENCE_TYPE
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, fingerprint, learnt_from
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import left_out, surprise
@@ -89,7 +87,7 @@ def _fill_prior(points, tilt, weights, inverse_l, center, variance, slope):
                             slope[i, k] += 2.0 * both * change * tilt[i, a, k]
 
 
-@njit(types.float64(types.float64[::1], EVIDENCE_TYPE), cache=True)
+@njit(cache=True)
 def log_posterior(theta, evidence):
     """Return the log posterior density of theta (3 d + 1,), up to a constant."""
     n, d = evidence.X.shape

@@ -151,7 +151,7 @@ def _log_prior(theta, evidence):
     return value
 
 
-@njit(types.float64(types.float64[::1], EVIDENCE_TYPE), cache=True)
+@njit(cache=True)
 def log_posterior(theta, evidence):
     """Return the log posterior density of theta (p,), up to no constant; -inf where A is not positive definite."""
     value = _log_prior(theta, evidence)

@@ -12,7 +12,15 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.defaults import LENGTH_SCALE_DEVIATION, LENGTH_SCALE_MEDIAN, NUGGET, RELEARNT_DIVISOR, SURPRISE
+from surehold.defaults import (
+    LENGTH_SCALE_DEVIATION,
+    LENGTH_SCALE_MEDIAN,
+    MANY,
+    MANY_LEARNT,
+    NUGGET,
+    RELEARNT_DIVISOR,
+    SURPRISE,
+)
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.surrogates.gaussian_process.heteroscedastic import most_likely_noise
@@ -26,6 +34,7 @@ from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
 )
 from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence, log_posterior
+from surehold.optimization.surrogates.gaussian_process.neighbors import NeighborPosterior
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization, checked_range
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 from surehold.optimization.surrogates.protocol import Posterior, mixture
@@ -116,7 +125,7 @@ class GaussianProcess:
         self._length_scales = None if length_scales is None else np.asarray(length_scales, dtype=np.float64)
         if self._length_scales is not None and not np.all((self._length_scales > 0) & np.isfinite(self._length_scales)):
             raise InputError(f"length_scales are {length_scales!r}; give positive finite numbers, one a dimension.")
-        self._posterior: GaussianProcessPosterior | None = None
+        self._posterior: GaussianProcessPosterior | NeighborPosterior | None = None
         self._learnt: OrderedDict[bytes, tuple[Standardization, Learnt]] = OrderedDict()  # saves time, changes nothing
 
     @property
@@ -138,16 +147,29 @@ class GaussianProcess:
         rng: np.random.Generator,
         previous: Posterior | None = None,
         noise: NDArray[np.float64] | None = None,
-    ) -> GaussianProcessPosterior:
+    ) -> GaussianProcessPosterior | NeighborPosterior:
         """Learn the hyperparameters from X (n, d) in the unit cube and finite y (n,), n >= 1.
 
         From 32 trials on they are learnt from the first k of them, n - n/16 < k <= n, unless the later trials
         contradict what was learnt: k, and all that follows, depend on the trials and `rng` alone, and one more trial
-        seldom costs a new learning.
+        seldom costs a new learning. Of more than `defaults.MANY` trials a query is answered from those near it alone.
         `previous` is the posterior of the step before; its last particle starts the chains of the learning "slice".
         `noise` (n,) are known standard deviations of the observations, in the outputs' units, in place of the setting.
         """
-        if self._learning.method == "slice" or self._length_scales is not None or self._noise == "heteroscedastic":
+        if len(y) > MANY and self._learns_at_once:
+            return self._on_neighbors(learnt_from(len(y)), X, y, noise, int(rng.integers(2**63)))
+        return self.condition_on_all(X, y, rng, previous, noise)
+
+    def condition_on_all(
+        self,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        rng: np.random.Generator,
+        previous: Posterior | None = None,
+        noise: NDArray[np.float64] | None = None,
+    ) -> GaussianProcessPosterior:
+        """Do as `condition` does, with all trials in one matrix, however many there are."""
+        if not self._learns_at_once:
             last = previous.hyperparameters.theta[-1] if isinstance(previous, GaussianProcessPosterior) else None
             return self.condition_on_blocks(X, y, rng, self.standardization(y), start=last, noise=noise)
         n, stream = len(y), int(rng.integers(2**63))
@@ -157,20 +179,48 @@ class GaussianProcess:
             posterior = self._learnt_from(n, X, y, noise, stream)
         return posterior
 
+    @property
+    def _learns_at_once(self) -> bool:
+        """Whether hyperparameters are learnt, without a chain that goes on or noise at every single trial."""
+        return self._learning.method != "slice" and self._length_scales is None and self._noise != "heteroscedastic"
+
     def _learnt_from(
         self, k: int, X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, stream: int
     ) -> GaussianProcessPosterior:
         """Return the posterior given all trials, with hyperparameters that were learnt from the first k of them."""
-        key = fingerprint(X[:k], y[:k], None if noise is None else noise[:k], stream)
-        if key not in self._learnt:
-            outputs = self.standardization(y[:k])
-            evidence = self._evidence(X[:k], y[:k], outputs, [k], (1.0,), None if noise is None else noise[:k])
-            self._learnt[key] = outputs, self._learn(evidence, outputs, np.random.default_rng([stream, k]), None)
-            while len(self._learnt) > _REMEMBERED:
-                self._learnt.popitem(last=False)
-        outputs, (particles, cost) = self._learnt[key]
+        outputs, (particles, cost) = self._remembered(slice(0, k), X, y, noise, np.random.default_rng([stream, k]))
         evidence = self._evidence(X, y, outputs, [len(y)], (1.0,), noise)
         return GaussianProcessPosterior(evidence, particles, outputs, cost)
+
+    def _on_neighbors(
+        self, k: int, X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, stream: int
+    ) -> NeighborPosterior:
+        """Return the posterior given many trials, with hyperparameters learnt from some of the first k.
+
+        Every so manieth in their order: early trials are spread over the box, late ones lie where the function is high.
+        """
+        some = slice(0, k, -(-k // MANY_LEARNT))
+        outputs, (particles, cost) = self._remembered(some, X, y, noise, np.random.default_rng([stream, k]))
+        return NeighborPosterior(self._evidence(X, y, outputs, [len(y)], (1.0,), noise), particles, outputs, cost)
+
+    def _remembered(
+        self,
+        part: slice,
+        X: NDArray[np.float64],
+        y: NDArray[np.float64],
+        noise: NDArray[np.float64] | None,
+        rng: np.random.Generator,
+    ) -> tuple[Standardization, Learnt]:
+        """Return the scale of the outputs and the hyperparameters that a part of the trials teaches, once."""
+        X, y, noise = X[part], y[part], None if noise is None else noise[part]
+        key = fingerprint(X, y, noise, rng.bit_generator.state)
+        if key not in self._learnt:
+            outputs = self.standardization(y)
+            evidence = self._evidence(X, y, outputs, [len(y)], (1.0,), noise)
+            self._learnt[key] = outputs, self._learn(evidence, outputs, rng, None)
+            while len(self._learnt) > _REMEMBERED:
+                self._learnt.popitem(last=False)
+        return self._learnt[key]
 
     def _learn(
         self, evidence: Evidence, outputs: Standardization, rng: np.random.Generator, start: NDArray[np.float64] | None
@@ -300,7 +350,7 @@ class GaussianProcess:
         return self
 
     @property
-    def posterior(self) -> GaussianProcessPosterior:
+    def posterior(self) -> GaussianProcessPosterior | NeighborPosterior:
         """What `fit` has learnt."""
         if self._posterior is None:
             raise InputError("this GaussianProcess has seen no data; call fit(X, y) first.")

@@ -192,7 +192,7 @@ class TreedGaussianProcess:
         count = len(partition.leaves)
         if count == 1:
             before = None if old is None else old.leaves[_nearest(partition, 0, old)]
-            return TreedPosterior(partition, (self._process.condition(X, y, rng, before, noise),), len(y))
+            return TreedPosterior(partition, (self._process.condition_on_all(X, y, rng, before, noise),), len(y))
         outputs = self._process.standardization(y).coarse()
         leaves = tuple(self._leaf(j, partition, X, y, noise, outputs, rng, old) for j in range(count))
         return TreedPosterior(partition, leaves, len(y))

@@ -1,0 +1,240 @@
+"""A Gaussian process on many trials: every query is answered from the trials that say most about it (compiled in part).
+
+Legend
+    n    trials, k << n those that one query is answered from
+    m    particles of the hyperparameters, learnt from a part of the trials
+
+Conditioning on the nearest trials alone leaves out little, for these screen the others (Vecchia 1988; Stein 2002). A
+few farther ones belong to them, or the prediction would depend on a small place only (Stein, Chi and Welty 2004): the
+nearest of all trials, of every eighth, and of every 64th. Time and memory of a query do not grow with n.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.defaults import NEIGHBORS
+from surehold.errors import SureholdError
+from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
+from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
+from surehold.optimization.surrogates.gaussian_process.posterior import Hyperparameters
+from surehold.optimization.surrogates.gaussian_process.prediction import average, factorize, sample
+from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Regions
+from surehold.store.kernels import njit
+
+__all__ = ["NeighborPosterior"]
+
+_COARSER: Final = 8  # every so manieth trial is in the next coarser set
+_SAMPLED: Final = 384  # trials, about, that joint draws are conditioned on
+
+
+class NeighborPosterior:
+    """A Gaussian process conditioned on many trials; arguments as of `GaussianProcessPosterior`."""
+
+    def __init__(
+        self,
+        evidence: Evidence,
+        theta: NDArray[np.float64],
+        outputs: Standardization,
+        cost: int,
+        Y: NDArray[np.float64] | None = None,
+    ):
+        from scipy.spatial import KDTree
+
+        m, (n, d) = len(theta), evidence.X.shape
+        self.evidence: Final = evidence
+        self.outputs: Final = outputs
+        self.hyperparameters: Final = Hyperparameters(
+            theta,
+            np.exp(-theta[:, :d]),
+            np.exp(theta[:, d]) if evidence.learn_signal else np.full(m, evidence.signal_variance),
+            np.exp(theta[:, -1]) if evidence.learn_noise else np.zeros(m),
+        )
+        self._Y: Final = np.ascontiguousarray(np.broadcast_to(evidence.y, (m, n)) if Y is None else Y)
+        self._scale: Final = np.exp(-theta[:, :d].mean(axis=0))
+        parts = [np.arange(n)[:: _COARSER**level] for level in range(3)]
+        self._trees: Final = [(part, KDTree(evidence.X[part] * self._scale)) for part in parts]
+        self.diagnostics: Final = FitDiagnostics(n, cost, 0, outputs.flat)
+        self.regions: Final = Regions.whole(d)
+
+    def nearest(self, queries: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the trials (q, k) that queries (q, d) are answered from, in rising order, and how many each has (q,).
+
+        A row with fewer is filled up with its last one.
+        """
+        found = []
+        for (part, tree), count in zip(self._trees, NEIGHBORS, strict=True):
+            rows = tree.query(queries * self._scale, k=np.arange(1, min(count, len(part)) + 1))[1]  # pyright: ignore[reportArgumentType]
+            found.append(part[rows])
+        rows = np.sort(np.concatenate(found, axis=1), axis=1)
+        first = np.concatenate([np.ones((len(rows), 1), dtype=bool), rows[:, 1:] != rows[:, :-1]], axis=1)
+        counts = first.sum(axis=1)
+        order = np.argsort(~first, axis=1, kind="stable")
+        return np.ascontiguousarray(np.take_along_axis(rows, order, axis=1), dtype=np.int64), counts.astype(np.int64)
+
+    def average(
+        self,
+        queries: NDArray[np.float64],
+        offsets: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        gradient: bool = False,
+        slopes: NDArray[np.float64] | None = None,
+    ) -> Moments:
+        """Return the moments of sum_i weights[i] f(query + offsets[i]); see `GaussianProcessPosterior.average`."""
+        shape = (-1, *offsets.shape[-2:])
+        rows, counts = self.nearest(queries)
+        mean, variance, mean_gradient, variance_gradient = average_by_neighbors(
+            np.ascontiguousarray(queries),
+            np.ascontiguousarray(offsets).reshape(shape),
+            np.ascontiguousarray(np.ones_like(offsets) if slopes is None else slopes).reshape(shape),
+            np.ascontiguousarray(weights),
+            self.evidence.X,
+            self._Y,
+            self.evidence.noise,
+            self.hyperparameters.inverse_l,
+            self.hyperparameters.s2,
+            self.hyperparameters.v,
+            self.evidence.ratio,
+            self.evidence.mean_variance,
+            self.evidence.kernel,
+            rows,
+            counts,
+            gradient,
+        )
+        if np.isnan(mean).any():
+            raise SureholdError("the covariance of the trials could not be factorized; are outputs of sane size?")
+        scale = self.outputs.scale
+        return Moments(
+            self.outputs.shift * weights.sum() + scale * mean,
+            self.outputs.square * variance,
+            scale * mean_gradient if gradient else None,
+            self.outputs.square * variance_gradient if gradient else None,
+        )
+
+    def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
+        """Return the moments of f at queries (q, d)."""
+        return self.average(queries, np.zeros((1, queries.shape[1])), np.ones(1), gradient)
+
+    def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s).
+
+        The points of a query are drawn given the nearest trials of each of them.
+        """
+        m, (q, s, _) = len(self._Y), points.shape
+        draws = np.empty((m, q, *normals.shape))
+        for i in range(q):
+            rows = np.unique(self.nearest(points[i])[0][:, :: max(1, s * sum(NEIGHBORS) // _SAMPLED)])
+            X, Y, noise = self.evidence.X[rows], np.ascontiguousarray(self._Y[:, rows]), self.evidence.noise[rows]
+            inverse_L, alpha = np.empty((m, len(rows), len(rows))), np.empty((m, len(rows)))
+            own = self.hyperparameters
+            evidence = self.evidence
+            shared = evidence.mean_variance, evidence.kernel
+            factorize(X, Y, noise, own.inverse_l, own.s2, own.v, evidence.ratio, *shared, inverse_L, alpha)
+            part = np.ascontiguousarray(points[i : i + 1])
+            draws[:, i : i + 1] = sample(
+                part, np.ascontiguousarray(normals), X, own.inverse_l, own.s2, *shared, inverse_L, alpha
+            )
+        if np.isnan(draws).any():
+            raise SureholdError("nothing can be drawn: the covariance of the points could not be factorized.")
+        return self.outputs.shift + self.outputs.scale * draws
+
+    def thinned(self, count: int, first: int = 0) -> "NeighborPosterior":
+        """Return the posterior of about `count` of the particles, from number `first` on: a cheaper approximation."""
+        step = max(1, len(self._Y) // count)
+        every = slice(first % step, None, step)
+        theta = self.hyperparameters.theta[every]
+        return NeighborPosterior(self.evidence, theta, self.outputs, self.diagnostics.evaluations, self._Y[every])
+
+    def with_pending(self, X: NDArray[np.float64]) -> "NeighborPosterior":
+        """Return the posterior as if each particle's own mean had been observed at X (k, d): only variances shrink."""
+        believed = self.outputs.apply(self.moments(X).mean)  # (m, k)
+        known = np.full(len(X), self.evidence.noise.mean())
+        extended = self.evidence._replace(
+            X=np.concatenate([self.evidence.X, X]),
+            y=np.concatenate([self.evidence.y, believed.mean(axis=0)]),
+            noise=np.concatenate([self.evidence.noise, known]),
+            offsets=np.array([0, len(self.evidence.X) + len(X)]),
+        )
+        Y = np.concatenate([self._Y, believed], axis=1)
+        theta = self.hyperparameters.theta
+        return NeighborPosterior(extended, theta, self.outputs, self.diagnostics.evaluations, Y)
+
+    def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance of the observation noise (m, q) at X (q, d), known or learnt, in squared outputs."""
+        known = np.full(len(X), self.evidence.noise.mean())
+        return self.outputs.square * (known + self.hyperparameters.v[:, None])
+
+    @property
+    def length_scales(self) -> NDArray[np.float64]:
+        """Length-scales of the particles, (m, d), in widths of the unit cube."""
+        return 1.0 / self.hyperparameters.inverse_l
+
+
+@njit(cache=True)
+def average_by_neighbors(
+    Q,
+    offsets,
+    slopes,
+    weights,
+    X,
+    Y,
+    noise,
+    inverse_l,
+    s2,
+    v,
+    ratio,
+    mean_variance,
+    kernel,
+    rows,
+    counts,
+    gradient,
+):
+    """Return what `prediction.average` does, each query given the trials of its row alone; NaN on failure."""
+    m = Y.shape[0]
+    q, d = Q.shape
+    mean = np.empty((m, q))
+    variance = np.empty((m, q))
+    mean_gradient = np.empty((m, q if gradient else 0, d))
+    variance_gradient = np.empty((m, q if gradient else 0, d))
+    last = offsets.shape[0] - 1
+    for i in range(q):
+        k = counts[i]
+        near = np.empty((k, d))
+        values = np.empty((m, k))
+        loud = np.empty(k)
+        for a in range(k):
+            row = rows[i, a]
+            loud[a] = noise[row]
+            for c in range(d):
+                near[a, c] = X[row, c]
+            for j in range(m):
+                values[j, a] = Y[j, row]
+        inverse_L = np.empty((m, k, k))
+        alpha = np.empty((m, k))
+        if factorize(near, values, loud, inverse_l, s2, v, ratio, mean_variance, kernel, inverse_L, alpha) < 0:
+            mean[:] = np.nan
+            return mean, variance, mean_gradient, variance_gradient
+        b = min(i, last)
+        one_mean, one_variance, by_mean, by_variance = average(
+            Q[i : i + 1],
+            offsets[b : b + 1],
+            slopes[b : b + 1],
+            weights,
+            near,
+            inverse_l,
+            s2,
+            mean_variance,
+            kernel,
+            inverse_L,
+            alpha,
+            gradient,
+        )
+        for j in range(m):
+            mean[j, i] = one_mean[j, 0]
+            variance[j, i] = one_variance[j, 0]
+            if gradient:
+                for c in range(d):
+                    mean_gradient[j, i, c] = by_mean[j, 0, c]
+                    variance_gradient[j, i, c] = by_variance[j, 0, c]
+    return mean, variance, mean_gradient, variance_gradient

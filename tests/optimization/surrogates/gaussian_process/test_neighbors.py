@@ -1,0 +1,114 @@
+"""Predictions from the nearest trials, compared with those from all of them."""
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import cdist
+from scipy.stats import qmc
+
+import surehold as sh
+from surehold.defaults import MANY, NEIGHBORS
+from surehold.optimization.surrogates.gaussian_process.neighbors import NeighborPosterior
+from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
+
+
+def _response(X):
+    return np.sin(6.0 * X[:, 0]) * np.cos(4.0 * X[:, 1]) + 0.3 * X.sum(axis=1)
+
+
+def _trials(n, d=2, seed=0):
+    X = qmc.LatinHypercube(d, rng=seed).random(n)
+    return X, _response(X)
+
+
+def _both(n, d=2, noise=None):
+    X, y = _trials(n, d)
+    settings = {} if noise is None else {"noise": noise}
+    exact = sh.GaussianProcess(**settings).condition_on_all(X, y, np.random.default_rng(1))
+    theta = exact.hyperparameters.theta
+    return exact, NeighborPosterior(exact.evidence, theta, exact.outputs, exact.diagnostics.evaluations)
+
+
+OFFSETS = 0.05 * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+WEIGHTS = np.array([0.4, 0.15, 0.15, 0.15, 0.15])
+
+
+@pytest.mark.parametrize("gradient", [False, True])
+def test_with_fewer_trials_than_neighbors_nothing_is_left_out(gradient):
+    exact, near = _both(NEIGHBORS[0])
+    queries = np.random.default_rng(2).random((7, 2))
+    for ours, theirs in zip(
+        near.average(queries, OFFSETS, WEIGHTS, gradient),
+        exact.average(queries, OFFSETS, WEIGHTS, gradient),
+        strict=True,
+    ):
+        if theirs is None:
+            assert ours is None
+        else:
+            np.testing.assert_allclose(ours, theirs, rtol=2e-3, atol=1e-6)  # sums in another order
+    pending = np.array([[0.5, 0.5]])
+    np.testing.assert_allclose(
+        near.with_pending(pending).moments(queries).variance,
+        exact.with_pending(pending).moments(queries).variance,
+        rtol=2e-3,
+        atol=1e-6,
+    )
+    normals = np.random.default_rng(3).standard_normal((3, 2))
+    points = np.random.default_rng(4).random((2, 2, 2))
+    np.testing.assert_allclose(near.sample(points, normals), exact.sample(points, normals), rtol=2e-3, atol=1e-4)
+    np.testing.assert_allclose(near.noise_variance(queries), exact.noise_variance(queries))
+    assert near.thinned(3).moments(queries).mean.shape == exact.thinned(3).moments(queries).mean.shape
+
+
+@pytest.mark.parametrize("noise", [None, 0.1])
+def test_the_nearest_trials_tell_nearly_what_all_do(noise):
+    exact, near = _both(300, noise=noise)
+    queries = np.random.default_rng(2).random((40, 2))
+    theirs, ours = exact.average(queries, OFFSETS, WEIGHTS), near.average(queries, OFFSETS, WEIGHTS)
+    deviation = np.sqrt(theirs.variance)
+    miss = np.abs(ours.mean - theirs.mean)
+    assert miss.max() < 0.01 * np.std(_response(queries)) or np.sqrt(np.mean((miss / deviation) ** 2)) < 0.5
+    assert np.all(ours.variance >= theirs.variance - 1e-9), "fewer trials never tell more"
+    assert np.median(np.sqrt(ours.variance) / deviation) < 1.5
+
+
+def test_the_nearest_of_every_set_are_found():
+    _, near = _both(300)
+    queries = np.random.default_rng(5).random((9, 2))
+    rows, counts = near.nearest(queries)
+    scale = np.exp(-near.hyperparameters.theta[:, :2].mean(axis=0))
+    distances = cdist(queries * scale, near.evidence.X * scale)
+    for i in range(9):
+        wanted = set()
+        for level, count in enumerate(NEIGHBORS):
+            part = np.arange(300)[:: 8**level]
+            wanted |= set(part[np.argsort(distances[i, part])[:count]].tolist())
+        assert set(rows[i, : counts[i]].tolist()) == wanted
+
+
+def test_gradients_are_those_of_the_values_where_the_neighbors_stay():
+    _, near = _both(300, noise=0.1)
+    query, step = np.array([[0.31, 0.62]]), 1e-5
+    found = near.average(query, OFFSETS, WEIGHTS, gradient=True)
+    for k in range(2):
+        shift = step * np.eye(2)[k]
+        up, down = (near.average(query + sign * shift, OFFSETS, WEIGHTS) for sign in (1.0, -1.0))
+        np.testing.assert_allclose(found.mean_gradient[:, 0, k], (up.mean - down.mean)[:, 0] / (2 * step), rtol=1e-3)
+
+
+def test_many_trials_are_answered_from_their_neighbors_and_few_are_not():
+    model = sh.GaussianProcess()
+    for n, kind in ((MANY, GaussianProcessPosterior), (MANY + 1, NeighborPosterior)):
+        assert isinstance(model.fit(*_trials(n)).posterior, kind)
+    assert isinstance(sh.GaussianProcess(length_scales=0.2).fit(*_trials(MANY + 1)).posterior, GaussianProcessPosterior)
+
+
+def test_an_optimizer_with_many_trials_still_finds_the_top():
+    X, y = _trials(MANY + 20)
+    optimizer = sh.Optimizer(sh.Box.unit(2), n_initial=1, seed=0)
+    for x, value in zip(X, y, strict=True):
+        optimizer.tell(x, value)
+    for _ in range(12):
+        x = optimizer.ask()
+        optimizer.tell(x, float(_response(x[None])[0]))
+    net = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, 801),) * 2), axis=-1).reshape(-1, 2)
+    assert optimizer.recommend().observed > _response(net).max() - 1e-3

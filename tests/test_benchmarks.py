@@ -1,0 +1,18 @@
+"""The stored table of benchmarks: what is written is read again, and a loss is marked. Nothing is timed here."""
+
+from benchmarks import stored
+
+
+def test_a_stored_table_is_compared_in_yardsticks(tmp_path):
+    assert stored.last(tmp_path) == {}
+    path = stored.store({"ask": 0.02, "grasp": 0.001}, 1e-4, tmp_path)
+    assert path.parent == tmp_path
+    before = stored.last(tmp_path)
+    assert before == {"ask": 200.0, "grasp": 10.0}
+    head, ask, grasp, new = stored.lines({"ask": 0.03, "grasp": 0.0021, "more": 1.0}, 2e-4, before)
+    assert "to the last" in head
+    assert ask.endswith(" 0.75"), "the machine is half as fast: it is a gain"
+    assert grasp.endswith(" 1.05")
+    assert "new" in new
+    (_, lost) = stored.lines({"ask": 0.03}, 1e-4, before)
+    assert lost.endswith("1.50  SLOWER")

@@ -1,0 +1,79 @@
+"""Random embeddings: the maps are those of the papers, trials are kept, and hidden functions are found."""
+
+import numpy as np
+import pytest
+
+import surehold as sh
+from surehold.embedding import NestedEmbedding, RandomEmbedding
+from surehold.errors import InputError
+
+
+def _hidden(x):
+    return -float((x[3] - 0.4) ** 2 + (x[17] - 0.7) ** 2)
+
+
+def test_hidden_variables_are_found_in_bins():
+    search = NestedEmbedding(sh.Box.unit(30), trials=60, dimension=2, seed=1)
+    for _ in range(60):
+        x = search.ask()
+        assert np.all((x >= 0.0) & (x <= 1.0))
+        search.tell(x, _hidden(x))
+    random = np.random.default_rng(0).random((200, 60, 30))
+    assert search.best()[1] > 0.2 * np.median([max(_hidden(x) for x in run) for run in random])
+    assert _hidden(search.best()[0]) == search.best()[1]
+
+
+def test_the_best_point_of_a_subspace_is_found():
+    search = RandomEmbedding(sh.Box.unit(30), dimension=2, seed=1)
+    top = np.clip(0.5 + 0.5 * search._maps[0] @ [0.3, -0.2], 0.0, 1.0)
+    for _ in range(40):
+        x = search.ask()
+        search.tell(x, -float(np.square(x - top).sum()))
+    assert search.best()[1] > -0.01, "points of the box itself are 2.5 away at best"
+
+
+def test_points_are_images_of_the_map_moved_to_the_border():
+    search = RandomEmbedding(sh.Box.unit(40), dimension=3, seed=2)
+    x = search.ask()
+    A, z = search._maps[0], search._asked[0][2]
+    assert A.shape == (40, 3)
+    assert np.all(np.abs(z) <= np.sqrt(3.0))
+    np.testing.assert_allclose(x, np.clip(0.5 + 0.5 * A @ z, 0.0, 1.0))
+
+
+def test_embeddings_take_turns():
+    search = RandomEmbedding(sh.Box.unit(10), dimension=2, embeddings=3, seed=0)
+    for _ in range(6):
+        search.ask()
+    assert [turn for _, turn, _ in search._asked] == [0, 1, 2, 0, 1, 2]
+
+
+def test_dividing_the_bins_keeps_every_trial_where_it_was():
+    search = NestedEmbedding(sh.Box.unit(20), trials=40, dimension=2, seed=3)
+    seen, sizes = [], []
+    for _ in range(40):
+        x = search.ask()
+        search.tell(x, _hidden(x))
+        seen.append(x)
+        sizes.append(search.dimension)
+        for place, tried in zip(search._places, seen, strict=True):
+            np.testing.assert_allclose(search._spread(place), tried)
+        assert sorted(np.concatenate(search._bins).tolist()) == list(range(20))
+    assert sizes[0] == 2
+    assert sorted(set(sizes)) == [2, 8, 20]
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: RandomEmbedding(sh.Box.unit(3), dimension=4), "dimension is 4; give 1 to 3"),
+        (lambda: RandomEmbedding(sh.Box.unit(3), dimension=0), "dimension is 0"),
+        (lambda: NestedEmbedding(sh.Box.unit(3), trials=0, dimension=1), "0 embeddings or trials"),
+        (lambda: RandomEmbedding(sh.Box.unit(3), 2, input_noise=sh.InputNoise.unit(0.1)), "input_noise is about"),
+        (lambda: RandomEmbedding(sh.Box.unit(3), 2).best(), "no trial has given a value"),
+        (lambda: RandomEmbedding(sh.Box.unit(3), 2).tell(np.zeros(3), 1.0), "was not asked for"),
+    ],
+)
+def test_bad_input_is_said_in_one_line(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
