@@ -47,8 +47,8 @@ class Outcomes:
         return self._kept[key]
 
     def __call__(self, x: Any) -> float:
-        """Return the quality at x (d,)."""
-        return self.grasp(x).quality
+        """Return the quality at x (d,); where the shape is not known, its mean over the shapes."""
+        return self.problem(x) if self.problem.object.draws else self.grasp(x).quality
 
 
 def simulator_preset(preset: str) -> str:
@@ -68,8 +68,11 @@ def simulator_preset(preset: str) -> str:
 def grasp(
     obj: Annotated[
         str,
-        typer.Argument(metavar="OBJECT", help="mug, bottle, glass, drill, or a mesh file (STL, OBJ, PLY, glTF, GLB)."),
-    ],
+        typer.Argument(
+            metavar="[OBJECT]",
+            help="mug, bottle, glass, drill, or a mesh file (STL, OBJ, PLY, glTF, GLB); of a point cloud see --cloud.",
+        ),
+    ] = "",
     method: Method = "ubo",
     trials: Trials = 100,
     initial: Initial = 40,
@@ -125,6 +128,7 @@ def grasp(
             status=outcome.status,
             pose=f"palm at ({position}) mm, quaternion ({turn}), s1 = {outcome.s1:.2f} rad",
             details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
+            | losses(problem, candidate.x, input_noise, seed)
             | physics,
             scene=replace(
                 gather.grasp_scene(grasp_scene(problem.simulator, outcome)), neighbors=neighbors_of(problem, candidate)
@@ -178,6 +182,21 @@ def grasp(
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)
+
+
+def losses(problem: Any, x: Any, noise: Any, seed: int) -> dict[str, str]:
+    """Return what a grasp of an object of unknown shape loses to the pose and to the shape, in words."""
+    from surehold.problems.grasp.shape_loss import shape_loss
+
+    if not problem.object.draws or noise is None:
+        return {}
+    loss = shape_loss(problem, x, noise, seed=seed)
+    return {
+        "on the mean shape": f"{loss.nominal:.3f}",
+        "lost to the pose": f"{loss.pose:.3f}",
+        "lost to the unknown shape": f"{loss.shape:.3f}",
+        "left under both": f"{loss.robust:.3f}",
+    }
 
 
 def neighbors_of(problem: Any, candidate: Any) -> Any:

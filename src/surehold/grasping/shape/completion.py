@@ -3,7 +3,8 @@
 Mirror. Most things that are made to be held are about as deep behind their widest place as before it (Bohg and others
 2011). Of the upright planes within 50 degrees of the view's, each is taken as near as the image allows: at most `_SEEN` of its
 mirrored points lie before the cloud or beside its outline, where they would have been seen. Where the cloud is nearly
-flat nothing tells the depth, and half of the shorter side is taken. The plane that makes the smallest whole is chosen.
+flat nothing tells the depth, and half of the shorter side is taken; what is deeper than wide is not made deeper, and of
+what is mirrored, points that would have been seen are left out. The plane that makes the smallest whole is chosen.
 Cloud and mirrored cloud make a surface, and that is the prior of another, which knows the cloud alone: how far a
 mirrored side is off is a matter of experience (`SPREAD`), not of the scatter of the points.
 
@@ -143,9 +144,8 @@ def mirrored(cloud: PointCloud, axes: Array) -> Completed:
 
     The cloud's camera must be known.
     """
-    assert cloud.camera is not None
     points = cloud.points
-    view = points.mean(axis=0) - cloud.camera
+    view = points.mean(axis=0) - np.asarray(cloud.camera)
     view = view / np.linalg.norm(view)
     up = axes[:, 2]
     level = view - (view @ up) * up
@@ -170,15 +170,17 @@ def _nearest_plane(cloud: PointCloud, normal: Array, image: "_Image") -> tuple[C
     across = cloud.points @ np.linalg.svd(normal[None])[2][1:].T
     sizes = np.sort(np.ptp(across, axis=0))
     start = front + (0.5 if back - front < 0.15 * sizes[0] else 0.1) * sizes[0]
-    allowed = False
-    plane = start
-    for plane in np.arange(start, max(back, start) + 0.5 * sizes[0], 0.002):
-        allowed = image.contradicted(cloud.points - 2.0 * (depth - plane)[:, None] * normal) <= _SEEN
+    # What is seen to be deeper than wide is not made deeper still.
+    farthest = front + 0.5 * max(back - front, float(sizes[1]))
+    hidden, plane, allowed = np.zeros(len(depth), dtype=bool), start, False
+    for plane in np.arange(start, max(farthest, start) + 0.001, 0.002):
+        seen = image.contradicted(cloud.points - 2.0 * (depth - plane)[:, None] * normal)
+        hidden, allowed = ~seen, float(np.mean(seen)) <= _SEEN
         if allowed:
             break
     normals = cloud.normals - 2.0 * (cloud.normals @ normal)[:, None] * normal
     turned = cloud.points - 2.0 * (depth - plane)[:, None] * normal
-    return Completed(turned, normals, normal, float(plane)), allowed
+    return Completed(turned[hidden], normals[hidden], normal, float(plane)), allowed
 
 
 class _Image:
@@ -187,8 +189,7 @@ class _Image:
     def __init__(self, cloud: PointCloud):
         from scipy.spatial import cKDTree
 
-        assert cloud.camera is not None
-        self._camera = cloud.camera
+        self._camera = np.asarray(cloud.camera)
         self._unit, self._far = self._seen(cloud.points)
         self._tree = cKDTree(self._unit)
         gaps = self._tree.query(self._unit, k=min(5, len(self._unit)))[0][:, -1]
@@ -205,12 +206,12 @@ class _Image:
         gap = self._tree.query(unit)[0]
         return np.where(gap > self._pixel, gap * far, 0.0)
 
-    def contradicted(self, points: Array) -> float:
-        """Return the share of points (n, 3) that would have been seen: before the cloud, or beside its outline."""
+    def contradicted(self, points: Array) -> NDArray[np.bool_]:
+        """Return which of points (n, 3) would have been seen: those before the cloud, or beside its outline."""
         unit, far = self._seen(points)
         gap, nearest = self._tree.query(unit)
         beside = gap > self._pixel
-        return float(np.mean(beside | (far < self._far[nearest] - 0.004)))
+        return beside | (far < self._far[nearest] - 0.004)
 
 
 def _of_cloud(cloud: PointCloud) -> Observations:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from surehold.errors import unknown_name
 from surehold.grasping.choices import CLOSING_MODES, COLLISIONS, CONES, CONTACT_MODELS, QUALITIES
 from surehold.grasping.hand.model import Hand
+from surehold.grasping.shape.prior import PRIORS
 
 __all__ = ["OPTIONS", "THESIS_SIMULATOR", "VARIABLES", "DescribedGrasp", "GraspOption", "GraspOptions", "checked_words"]
 
@@ -102,10 +103,24 @@ class DescribedGrasp(GraspOptions, total=False):
     variables: Annotated[
         Sequence[str], GraspOption(("dx", "dy"), f"Free variables, of {','.join(VARIABLES)}.", text=list)
     ]
-    unit: Annotated[str, GraspOption("", "Unit of a mesh file: mm, cm, m or in.")]
+    unit: Annotated[str, GraspOption("", "Unit of a mesh file or a cloud: mm, cm, m or in.")]
     mass: Annotated[float | None, GraspOption(None, "Mass of a mesh [kg]; by default that of water.", text=float)]
     frame: Annotated[str | None, GraspOption(None, "Axes of a mesh's box: file, principal, or auto (the smaller).")]
     hand_config: Annotated[str, GraspOption("", "YAML description of a hand's model file: palm, fingers, preshapes.")]
+    cloud: Annotated[str, GraspOption("", "Point cloud of the object instead: .ply, .pcd, .xyz or .npz.")]
+    camera: Annotated[
+        str | Sequence[float], GraspOption("", "Where the cloud was seen from: x,y,z in the file's unit.")
+    ]
+    normals: Annotated[bool, GraspOption(False, "Take the normals that the cloud's file holds.", text=bool)]
+    cloud_noise: Annotated[
+        float | None, GraspOption(None, "Standard deviation of a cloud's points [m]; measured by default.", text=float)
+    ]
+    prior: Annotated[
+        str, GraspOption("mirror", "What a cloud does not show: mirror (of what it shows), box or ellipsoid.", PRIORS)
+    ]
+    shapes: Annotated[
+        int, GraspOption(8, "Equally likely shapes of a cloud that a grasp is to hold; 0: the mean alone.", text=int)
+    ]
 
 
 _HINTS = get_type_hints(DescribedGrasp, include_extras=True)
