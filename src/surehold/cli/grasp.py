@@ -94,9 +94,7 @@ def grasp(
     from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
-    from surehold.grasping.pictures.scene import grasp_scene
     from surehold.problems.grasp.description import described_grasp
-    from surehold.reports import gather
     from surehold.reports.run_report import Candidate, RunReport
     from surehold.reports.still import still_picture
     from surehold.store.atomic import write_file
@@ -130,9 +128,7 @@ def grasp(
             details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
             | losses(problem, candidate.x, input_noise, seed)
             | physics,
-            scene=replace(
-                gather.grasp_scene(grasp_scene(problem.simulator, outcome)), neighbors=neighbors_of(problem, candidate)
-            ),
+            scene=replace(drawn(problem, outcome), neighbors=neighbors_of(problem, candidate)),
         )
 
     def also_write(report: RunReport, folder: Path) -> None:
@@ -182,6 +178,21 @@ def grasp(
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)
+
+
+def drawn(problem: Any, outcome: Any) -> Any:
+    """Return the scene of a grasp; an object of unknown shape is colored by how uncertain its surface is."""
+    from surehold.grasping.pictures.scene import grasp_scene
+    from surehold.reports.gather import grasp_scene as as_drawn
+    from surehold.reports.uncertain_shape import shape_meshes
+
+    scene = as_drawn(grasp_scene(problem.simulator, outcome))
+    body = problem.object
+    if not body.draws:
+        return scene
+    away = np.stack([draw.distances.distance(body.vertices) for draw in body.draws])
+    meshes = shape_meshes(body.vertices, body.faces, np.sqrt(np.mean(away**2, axis=0)))
+    return replace(scene, meshes=(*meshes, *scene.meshes[1:]))
 
 
 def losses(problem: Any, x: Any, noise: Any, seed: int) -> dict[str, str]:

@@ -104,8 +104,7 @@ def grid_of(surface: ImplicitSurface, cell: float, reach: float = REACH, growth:
     corners = surface.first.half * np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
     placed = surface.first.center + corners @ surface.first.axes.T
     lower, upper = placed.min(axis=0), placed.max(axis=0)
-    rim = placed.reshape(-1, 3)
-    spread = growth * float(np.median(surface.deviation(rim)))
+    spread = growth * float(np.median(surface.deviation(placed)))
     on_surface = surface.observations.points[surface.observations.values <= 0.0]
     if len(on_surface):
         lower = np.minimum(lower - spread, on_surface.min(axis=0))

@@ -25,8 +25,8 @@ __all__ = ["ImplicitSurface", "Observations", "Scales", "learnt_scales", "spaced
 
 Array = NDArray[np.float64]
 
-_ROUNDS: Final = 3  # of the active set
-_MOST_ACTIVE: Final = 150  # bounds that may become observations in a round
+_ROUNDS: Final = 2  # of the active set
+_MOST_ACTIVE: Final = 200  # bounds that may become observations in a round
 _BOUND_NOISE: Final = 0.001  # of a bound that has become an observation [m]
 _LEARNT_FROM: Final = 400  # observations from which the scales are learnt
 

@@ -19,7 +19,7 @@ __all__ = ["MOST_POINTS", "PointCloud", "Table", "cleaned"]
 
 Array = NDArray[np.float64]
 
-MOST_POINTS: Final = 5000  #: from which a surface is learnt; more are thinned to it
+MOST_POINTS: Final = 2500  #: from which a surface is learnt; more are thinned to it: dense algebra costs their cube
 _MOST_READ: Final = 300_000  # points that are looked at; of more, each n-th
 _LEAST_POINTS: Final = 20
 _LARGEST, _SMALLEST = 0.6, 0.005  # extent of what a hand can grasp [m]

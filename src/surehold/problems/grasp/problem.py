@@ -11,6 +11,7 @@ from the box center within h/3 and h/3 + 40 mm (1 + h / 50 mm), turns within ±4
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from typing import Any, Final, Unpack
 
 import numpy as np
@@ -103,6 +104,7 @@ class GraspProblem:
         facet = facet or default_facet(body)
         axes = facet_axes(facet)
         self.object: Final[GraspObject] = body
+        self._placed: GraspObject = body  # whose box the poses are relative to
         self.facet: Final[str] = facet
         self.name: Final[str] = f"{body.name}, {facet}"
         if preset not in OPTIONS["preset"].choices:
@@ -145,6 +147,10 @@ class GraspProblem:
         """Return the pose of the palm in the object's frame at x (d,)."""
         return self._pose(self._values(self._one(x)))
 
+    def posture(self, x: ArrayLike) -> float:
+        """Return the posture variable s1 at x (d,) [rad]."""
+        return self._values(self._one(x))["s1"]
+
     def grasp(self, x: ArrayLike) -> Grasp:
         """Return the whole outcome of the trial at x (d,)."""
         values = self._values(self._one(x))
@@ -169,6 +175,12 @@ class GraspProblem:
         pose = self._pose(values)
         return np.array([simulator.grasp(pose, values["s1"]).quality for simulator in self._others])
 
+    def on(self, obj: GraspObject) -> "GraspProblem":
+        """Return the problem with the same poses and settings, with another object in the place of this one."""
+        other = copy(self)
+        vars(other).update(object=obj, _simulator=None, _others=None, _placed=self._placed)
+        return other
+
     def _value(self, x: NDArray[np.float64]) -> float:
         return float(self.over_shapes(x).mean()) if self.object.draws else self.grasp(x).quality
 
@@ -182,7 +194,7 @@ class GraspProblem:
 
     def _pose(self, values: dict[str, float]) -> Pose:
         offsets = [values[name] for name in ("dx", "dy", "dz", "rx", "ry", "rz")]
-        return default_pose(self.simulator.hand, self.object, self.facet, self.default.standoff, offsets)
+        return default_pose(self.simulator.hand, self._placed, self.facet, self.default.standoff, offsets)
 
     def _values(self, x: NDArray[np.float64]) -> dict[str, float]:
         return self._fixed | self.box.as_dict(x)
