@@ -168,10 +168,10 @@ def _sweep(rows, nearest, first, h):
                             dx, dy, dz = x - rows[s, 0], y - rows[s, 1], z - rows[s, 2]
                             squared[i, j, k] = dx * dx + dy * dy + dz * dz
                         continue
-                    for axis in range(3):
-                        a = i - si * (axis == 0)
-                        b = j - sj * (axis == 1)
-                        c = k - sk * (axis == 2)
+                    for corner in range(1, 8):  # the neighbors behind, across corners as well
+                        a = i - si * (corner & 1)
+                        b = j - sj * (corner >> 1 & 1)
+                        c = k - sk * (corner >> 2 & 1)
                         if a < 0 or b < 0 or c < 0 or a >= nx or b >= ny or c >= nz:
                             continue
                         s = nearest[a, b, c]
@@ -204,7 +204,7 @@ def _distances(values, first, h):
                     square += (x[m] - row[m]) ** 2
                 aside = square - along * along  # of the crossing, in the plane
                 sign = -1.0 if values[i, j, k] < 0.0 else 1.0
-                in_plane = aside < h * h and sign * along > 0.0
+                in_plane = aside < 2.0 * h * h and sign * along > 0.0
                 size = 0.0
                 for m in range(3):
                     c[m] = (along * row[3 + m]) if in_plane else (x[m] - row[m])
