@@ -1,7 +1,7 @@
 """From a cleaned cloud to a belief: the side that was not seen, the prior shape, and the observations.
 
 Mirror. Most things that are made to be held are about as deep behind their widest place as before it (Bohg and others
-2011). Of the upright planes within 50 degrees of the view's, each is taken as near as the image allows: at most `_SEEN` of its
+2011). Of the upright planes within 50 degrees of the view's, each is taken as near as the image allows: hardly more than the least share of its
 mirrored points lie before the cloud or beside its outline, where they would have been seen. Where the cloud is nearly
 flat nothing tells the depth, and half of the shorter side is taken; what is deeper than wide is not made deeper, and of
 what is mirrored, points that would have been seen are left out. The plane that makes the smallest whole is chosen.
@@ -40,7 +40,7 @@ _MIRROR_NOISE: Final = 0.003  # of a mirrored point [m]
 _MOST_TURN: Final = 50.0  # between mirror plane and view [degrees]
 _MOST_SLOPES: Final = 250
 _SLOPE_NOISE: Final = 0.15  # of a normal's components
-_SEEN: Final = 0.05
+_SEEN: Final = 0.01
 _FREE_REACH: Final = 0.010  # m
 _FREE_STEPS: Final = (0.004, 0.010, 0.020, 0.035, 0.060, 0.090)  # before a point of the cloud [m]
 
@@ -159,12 +159,12 @@ def mirrored(cloud: PointCloud, axes: Array) -> Completed:
         turned, shown = _nearest_plane(cloud, normal, image)
         both = np.vstack([cloud.points, turned.points])
         volume = float(np.sqrt(np.linalg.det(np.cov(both.T))))
-        found.append((volume / np.cos(angle) * (1.0 if shown else 10.0), turned))
+        found.append((volume / np.cos(angle) * (1.0 + 10.0 * shown), turned))
     return min(found, key=lambda pair: pair[0])[1]
 
 
-def _nearest_plane(cloud: PointCloud, normal: Array, image: "_Image") -> tuple[Completed, bool]:
-    """Return the cloud mirrored at the nearest plane of that normal which the image allows, and whether one is."""
+def _nearest_plane(cloud: PointCloud, normal: Array, image: "_Image") -> tuple[Completed, float]:
+    """Return the cloud mirrored at the nearest plane of that normal which the image allows, and the share it denies."""
     depth = cloud.points @ normal
     front, back = np.quantile(depth, [0.01, 0.99])
     across = cloud.points @ np.linalg.svd(normal[None])[2][1:].T
@@ -172,15 +172,14 @@ def _nearest_plane(cloud: PointCloud, normal: Array, image: "_Image") -> tuple[C
     start = front + (0.5 if back - front < 0.15 * sizes[0] else 0.1) * sizes[0]
     # What is seen to be deeper than wide is not made deeper still.
     farthest = front + 0.5 * max(back - front, float(sizes[1]))
-    hidden, plane, allowed = np.zeros(len(depth), dtype=bool), start, False
-    for plane in np.arange(start, max(farthest, start) + 0.001, 0.002):
-        seen = image.contradicted(cloud.points - 2.0 * (depth - plane)[:, None] * normal)
-        hidden, allowed = ~seen, float(np.mean(seen)) <= _SEEN
-        if allowed:
-            break
+    planes = np.arange(start, max(farthest, start) + 0.001, 0.002)
+    turned = [cloud.points - 2.0 * (depth - plane)[:, None] * normal for plane in planes]
+    seen = np.stack([image.contradicted(points) for points in turned])
+    share = seen.mean(axis=1)
+    nearest = int(np.argmax(share <= max(_SEEN, float(share.min()) + _SEEN)))
+    hidden = ~seen[nearest]
     normals = cloud.normals - 2.0 * (cloud.normals @ normal)[:, None] * normal
-    turned = cloud.points - 2.0 * (depth - plane)[:, None] * normal
-    return Completed(turned[hidden], normals[hidden], normal, float(plane)), allowed
+    return Completed(turned[nearest][hidden], normals[hidden], normal, float(planes[nearest])), float(share[nearest])
 
 
 class _Image:
@@ -193,6 +192,7 @@ class _Image:
         self._unit, self._far = self._seen(cloud.points)
         self._tree = cKDTree(self._unit)
         gaps = self._tree.query(self._unit, k=min(5, len(self._unit)))[0][:, -1]
+        self._noise = float(np.median(cloud.noise))
         self._pixel = 1.5 * float(np.median(gaps))
 
     def _seen(self, points: Array) -> tuple[Array, Array]:
@@ -211,7 +211,7 @@ class _Image:
         unit, far = self._seen(points)
         gap, nearest = self._tree.query(unit)
         beside = gap > self._pixel
-        return beside | (far < self._far[nearest] - 0.004)
+        return beside | (far < self._far[nearest] - 0.002 - 2.0 * self._noise)
 
 
 def _of_cloud(cloud: PointCloud) -> Observations:

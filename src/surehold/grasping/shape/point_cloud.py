@@ -20,7 +20,7 @@ __all__ = ["MOST_POINTS", "PointCloud", "Table", "cleaned"]
 Array = NDArray[np.float64]
 
 MOST_POINTS: Final = 2500  #: from which a surface is learnt; more are thinned to it: dense algebra costs their cube
-_MOST_READ: Final = 300_000  # points that are looked at; of more, each n-th
+_MOST_READ: Final = 60_000  # points that are looked at; of more, each n-th
 _LEAST_POINTS: Final = 20
 _LARGEST, _SMALLEST = 0.6, 0.005  # extent of what a hand can grasp [m]
 _NEIGHBORS: Final = 12
@@ -215,7 +215,8 @@ def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Ar
         notes.append(f"{int(np.sum(~good)):,} outliers were left out")
         points = points[good]
         tree = cKDTree(points[:, :3])
-    pairs = tree.query_pairs(max(_APART, 4.0 * usual) if len(points) < 20_000 else 4.0 * usual, output_type="ndarray")
+    near = max(_APART if len(points) < 20_000 else 0.003, 4.0 * usual)  # fewer pairs of a dense cloud
+    pairs = tree.query_pairs(near, output_type="ndarray")
     ones = np.ones(len(pairs))
     graph = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
     _, group = connected_components(graph, directed=False)
