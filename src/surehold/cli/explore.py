@@ -83,9 +83,7 @@ def explore(
 class _Run:
     """An exploration of a known object, and what is shown of it."""
 
-    def __init__(
-        self, described: dict[str, Any], body: Any, start: str, goal: str, probe: bool, noise: Any, seed: int
-    ):
+    def __init__(self, described: dict[str, Any], body: Any, start: str, goal: str, probe: bool, noise: Any, seed: int):
         from surehold.grasping.object.distance_field import distance_field_of
         from surehold.grasping.shape.completion import belief_of_cloud
         from surehold.grasping.shape.point_cloud import cleaned

@@ -75,7 +75,7 @@ def test_normals_of_a_file_are_turned_to_the_camera(mug):
         (lambda p: 0.01 * p, "give its --unit"),
         (lambda p: 10.0 * p, "too much for a hand"),
         (lambda p: np.linspace(0.0, 0.1, 200)[:, None] * [1.0, 0.5, 0.0], "lie on a line"),
-        (lambda p: np.vstack([p, p[:900] + [0.3, 0.0, 0.0]]), "two objects"),
+        (lambda p: np.vstack([p, p[:900] + np.array([0.3, 0.0, 0.0])]), "two objects"),
     ],
 )
 def test_what_no_shape_can_be_learnt_from_is_said_in_one_line(mug, change, said):

@@ -33,7 +33,7 @@ class GraspObject:
     solids: tuple[Solid, ...] = field(default=(), repr=False)  #: the exact solids; empty for a mesh read from a file
     axes: NDArray[np.float64] = field(default_factory=lambda: np.eye(3), repr=False)  #: (3, 3) columns: axes of its box
     distances: "DistanceField | None" = field(default=None, repr=False)  #: where they are known; else they are computed
-    draws: "tuple[GraspObject, ...]" = field(default=(), repr=False)  #: equally likely shapes, where its own is not known
+    draws: "tuple[GraspObject, ...]" = field(default=(), repr=False)  #: equally likely shapes, if its own is unknown
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.friction) and self.friction > 0.0):

@@ -1,10 +1,10 @@
 """Point clouds from files: PLY, PCD, XYZ and NPZ, as they are, in the file's unit.
 
-    PLY   vertices x y z and, where they are there, nx ny nz (read by trimesh); faces are not looked at
-    PCD   ascii or binary, fields x y z and normal_x normal_y normal_z; the header's VIEWPOINT is the camera, unless it
-          is the origin, which most writers leave there. Compressed ones are refused with what unpacks them
-    XYZ   text, three or six columns: x y z and nx ny nz; # starts a comment
-    NPZ   arrays "points" (n, 3), and optionally "normals" (n, 3) and "camera" (3,)
+PLY   vertices x y z and, where they are there, nx ny nz (read by trimesh); faces are not looked at
+PCD   ascii or binary, fields x y z and normal_x normal_y normal_z; the header's VIEWPOINT is the camera, unless it
+      is the origin, which most writers leave there. Compressed ones are refused with what unpacks them
+XYZ   text, three or six columns: x y z and nx ny nz; # starts a comment
+NPZ   arrays "points" (n, 3), and optionally "normals" (n, 3) and "camera" (3,)
 """
 
 import io

@@ -1,10 +1,10 @@
 """From a cleaned cloud to a belief: the side that was not seen, the prior shape, and the observations.
 
 Mirror. Most things that are made to be held are about as deep behind their widest place as before it (Bohg and others
-2011). Of the upright planes within 50 degrees of the view's, each is taken as near as the image allows: hardly more than the least share of its
-mirrored points lie before the cloud or beside its outline, where they would have been seen. Where the cloud is nearly
-flat nothing tells the depth, and half of the shorter side is taken; what is deeper than wide is not made deeper, and of
-what is mirrored, points that would have been seen are left out. The plane that makes the smallest whole is chosen.
+2011). Of the upright planes within 50 degrees of the view's, each is taken as near as the image allows: hardly more
+than the least share of its mirrored points lie before the cloud or beside its outline, where they would have been seen;
+these are left out. Where the cloud is nearly flat nothing tells the depth, and half of the shorter side is taken; what
+is deeper than wide is not made deeper. The plane that makes the smallest whole is chosen.
 Cloud and mirrored cloud make a surface, and that is the prior of another, which knows the cloud alone: how far a
 mirrored side is off is a matter of experience (`SPREAD`), not of the scatter of the points.
 
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import unknown_name
 from surehold.grasping.shape.belief import ShapeBelief, grid_of
-from surehold.grasping.shape.implicit_surface import Observations, learnt_scales, spaced, surface_of
+from surehold.grasping.shape.implicit_surface import Observations, learnt_scales, surface_of
 from surehold.grasping.shape.level_set import grid_around
 from surehold.grasping.shape.point_cloud import PointCloud
 from surehold.grasping.shape.prior import PRIORS, PriorShape
@@ -114,13 +114,13 @@ def belief_of_cloud(
 
 def free_points(cloud: PointCloud, shape: PriorShape) -> Array:
     """Return points (b, 4) that the camera saw free, and the least distance of the object there [m]."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     rows = []
     if cloud.camera is not None:
         back = cloud.camera - cloud.points
         far = np.linalg.norm(back, axis=1)
-        tree = cKDTree(cloud.points)
+        tree = KDTree(cloud.points)
         some = _spread(len(cloud.points), 1500)
         for step in _FREE_STEPS:
             mine = some[far[some] > step + 0.01]
@@ -186,11 +186,11 @@ class _Image:
     """The cloud as its camera saw it: by direction, how far the nearest point is."""
 
     def __init__(self, cloud: PointCloud):
-        from scipy.spatial import cKDTree
+        from scipy.spatial import KDTree
 
         self._camera = np.asarray(cloud.camera)
         self._unit, self._far = self._seen(cloud.points)
-        self._tree = cKDTree(self._unit)
+        self._tree = KDTree(self._unit)
         gaps = self._tree.query(self._unit, k=min(5, len(self._unit)))[0][:, -1]
         self._noise = float(np.median(cloud.noise))
         self._pixel = 1.5 * float(np.median(gaps))

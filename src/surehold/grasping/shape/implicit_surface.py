@@ -106,7 +106,9 @@ class ImplicitSurface:
         return self.observations.points, self.observations.slope_points, self.alpha, self.beta
 
 
-def surface_of(prior: PriorShape | ImplicitSurface, observations: Observations, std: float, length: float) -> ImplicitSurface:
+def surface_of(
+    prior: PriorShape | ImplicitSurface, observations: Observations, std: float, length: float
+) -> ImplicitSurface:
     """Return the surface after its observations.
 
     Raises
@@ -172,7 +174,8 @@ def learnt_scales(prior: PriorShape, observations: Observations) -> Scales:
 
 
 def _conditioned(
-    prior: PriorShape | ImplicitSurface, observations: Observations, std: float, length: float) -> ImplicitSurface:
+    prior: PriorShape | ImplicitSurface, observations: Observations, std: float, length: float
+) -> ImplicitSurface:
     from scipy.linalg import cholesky
     from threadpoolctl import threadpool_limits
 

@@ -2,8 +2,8 @@
 
     F      values of f at the nodes (nx, ny, nz), negative inside      h   edge of a cell, m
     s, u   where an edge of the grid crosses the surface, and the unit normal there (linear along the edge)
-    c(x)   the point of the surface nearest to the node x: in the plane through the nearest crossing s, c = x - u u'(x - s)
-           where that is close to s, else s itself
+    c(x)   the point of the surface nearest to the node x: in the plane of the nearest crossing, x - u u'(x - s),
+           if that is close to s, else s itself
 
 f is only near a distance where it was measured; the closing needs one everywhere, or it steps through walls. Nearest
 crossings spread from node to node in eight sweeps (fast sweeping of closest points: Zhao 2005; Tsai 2002), so that
@@ -89,10 +89,11 @@ def level_set_mesh(values: Array, grid: Grid, level: float = 0.0) -> tuple[Array
     corners = np.stack(np.meshgrid(z, y, x, indexing="ij"), axis=-1).reshape(-1, 3)[:, ::-1]  # x is the fastest
     nx, ny, nz = padded.shape
     ordered = np.ascontiguousarray(padded.transpose(2, 1, 0).ravel())
-    vertices, faces, _ = igl.marching_cubes(ordered, np.ascontiguousarray(corners), nx, ny, nz, level)
+    made = igl.marching_cubes(ordered, np.ascontiguousarray(corners), nx, ny, nz, level)
+    vertices, faces = np.asarray(made[0], dtype=np.float64), np.asarray(made[1], dtype=np.int32)
     corner = vertices[faces]
     volume = np.einsum("fi,fi->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2]))
-    return vertices, np.ascontiguousarray(faces[:, ::-1] if volume < 0.0 else faces).astype(np.int32)
+    return vertices, np.ascontiguousarray(faces[:, ::-1] if volume < 0.0 else faces)
 
 
 @njit(cache=True)

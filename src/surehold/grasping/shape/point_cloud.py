@@ -172,10 +172,7 @@ def _table(points: Array, camera: Array | None) -> tuple[Table | None, NDArray[n
     middle = points[near].mean(axis=0)
     normal = np.linalg.svd(points[near] - middle, full_matrices=False)[2][2]
     height = (points - middle) @ normal
-    if camera is not None:
-        up = (camera - middle) @ normal
-    else:
-        up = np.sum(height[np.abs(height) > thick])
+    up = np.sum(height[np.abs(height) > thick]) if camera is None else (camera - middle) @ normal
     normal, height = (normal, height) if up >= 0.0 else (-normal, -height)
     thick = max(thick, 3.0 * float(np.std(height[np.abs(height) < thick])))
     above = height > thick
@@ -205,16 +202,16 @@ def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Ar
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    tree = cKDTree(points[:, :3])
+    tree = KDTree(points[:, :3])
     gaps = tree.query(points[:, :3], k=min(9, len(points)))[0][:, 1:].mean(axis=1)
     usual = float(np.median(gaps))
     good = gaps < 4.0 * usual
     if not np.all(good):
         notes.append(f"{int(np.sum(~good)):,} outliers were left out")
         points = points[good]
-        tree = cKDTree(points[:, :3])
+        tree = KDTree(points[:, :3])
     near = max(_APART if len(points) < 20_000 else 0.003, 4.0 * usual)  # fewer pairs of a dense cloud
     pairs = tree.query_pairs(near, output_type="ndarray")
     ones = np.ones(len(pairs))
@@ -228,7 +225,7 @@ def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Ar
         ray = seen - camera
         far = np.linalg.norm(ray, axis=1)
         seen = ray * (np.median(far) / far)[:, None]
-    first = cKDTree(seen[largest])
+    first = KDTree(seen[largest])
     kept = largest.copy()
     for number in order[1:]:
         mine = group == number
@@ -253,11 +250,11 @@ def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Ar
 
 def _planes(points: Array, camera: Array | None) -> tuple[Array, Array, Array]:
     """Return the points, outward normals (n, 3) and the scatter (n,) about the plane of the nearest neighbors [m]."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     k = min(_NEIGHBORS + 1, len(points))
     # Of dense clouds the neighbors are taken from a thinned one: noise must not be wider than what it is measured over.
-    near = cKDTree(points).query(points, k=k)[1]
+    near = KDTree(points).query(points, k=k)[1]
     local = points[near]  # (n, k, 3)
     middle = local.mean(axis=1, keepdims=True)
     spread = np.einsum("nki,nkj->nij", local - middle, local - middle) / (k - 3.0)

@@ -1,10 +1,12 @@
 """What is thought of a shape before it was measured: the distance to a box or an ellipsoid.
 
-    x   point in the prior's own frame, m      e   half extents (3,), m      rho   radius of a box's edges, m
-    q   max(|x| - (e - rho), 0)                k0 = |x / e|, k1 = |x / e^2|
+x   point in the prior's own frame, m      e   half extents (3,), m      rho   radius of a box's edges, m
+q   max(|x| - (e - rho), 0)                k0 = |x / e|, k1 = |x / e^2|
 
-    box        m(x) = |q| + min(max_i(|x_i| - e_i + rho), 0) - rho      the exact signed distance
-    ellipsoid  m(x) = k0 (k0 - 1) / k1                                 of first order: its slope is 1 on the surface
+box        m(x) = |q| + min(max_i(|x_i| - e_i + rho), 0) - rho      the exact signed distance
+ellipsoid  m(x) = k0 (k0 - 1) / k1                                 of first order: its slope is 1 on the surface
+
+Edges are round because nothing that is held is sharper, and because a process cannot follow a crease.
 """
 
 from dataclasses import dataclass
