@@ -84,7 +84,6 @@ class _Run:
     """An exploration of a known object, and what is shown of it."""
 
     def __init__(self, described: dict[str, Any], body: Any, start: str, goal: str, probe: bool, noise: Any, seed: int):
-        from surehold.grasping.object.distance_field import distance_field_of
         from surehold.grasping.shape.completion import belief_of_cloud
         from surehold.grasping.shape.point_cloud import cleaned
         from surehold.grasping.shape.views import camera_towards, half_view, surface_points
@@ -102,7 +101,6 @@ class _Run:
         self.real = self.problem.on(body)
         self.body, self.probe, self.noise, self.goal = body, probe, noise, goal
         self.exploration = Exploration(self.problem, belief, noise, goal, seed=seed)
-        self.field = distance_field_of(body)
         self._places = surface_points(body, 1500, np.random.default_rng(0))[0]
         self._felt = np.empty((0, 6))
         self.views: list[Any] = []
@@ -122,13 +120,14 @@ class _Run:
 
     def look(self) -> str:
         """Keep what is known of the shape now, and return it in words."""
+        from surehold.grasping.object.distance_field import distance_field_of
         from surehold.problems.perturbation import robust_score
         from surehold.reports.run_report import Candidate, ContactSet, Scene, SceneMesh
         from surehold.reports.uncertain_shape import shape_meshes
 
         belief, n = self.exploration.belief, len(self.exploration.X)
         mean = belief.mean_object()
-        error = 1e3 * np.abs(mean.distances.distance(self._places))
+        error = 1e3 * np.abs(distance_field_of(mean).distance(self._places))
         deviation = belief.surface.deviation(mean.vertices)
         self.answer = self.exploration.recommend()
         true = robust_score(self.real, self.answer.x, self.noise, n=50).mean

@@ -19,6 +19,11 @@ BOTTLE = shipped_object("bottle")
 PROBLEM = GraspProblem(BOTTLE)
 
 
+def a_grasp():
+    grid = np.stack(np.meshgrid([0.2, 0.35, 0.5, 0.65], [0.3, 0.5, 0.7]), axis=-1).reshape(-1, 2)
+    return next(x for x in PROBLEM.box.from_unit(grid) if len(PROBLEM.grasp(x).touching) > 3)
+
+
 @pytest.fixture(scope="module")
 def explored():
     run = Exploration(PROBLEM, belief_of_box(BOTTLE, cell=0.006), NOISE, shapes=2, seed=1)
@@ -72,8 +77,7 @@ def test_exploring_for_the_shape_goes_where_it_is_not_known(explored):
 
 
 def test_a_probe_ends_at_the_first_contact():
-    grid = PROBLEM.box.from_unit(np.stack(np.meshgrid([0.2, 0.35, 0.5, 0.65], [0.3, 0.5, 0.7]), axis=-1).reshape(-1, 2))
-    x = next(x for x in grid if len(PROBLEM.grasp(x).touching) > 3)
+    x = a_grasp()
     pose, s1 = PROBLEM.pose(x), PROBLEM.posture(x)
     whole, probe = (touch_trial(PROBLEM.simulator, pose, s1, only).observations for only in (False, True))
     assert 0 < len(probe.points) < len(whole.points)
@@ -92,7 +96,7 @@ def test_a_hand_that_meets_the_object_on_its_way_feels_it():
 def test_value_over_draws_is_the_mean_over_simulators():
     wider = replace(BOTTLE, friction=0.9)
     unknown = PROBLEM.on(replace(BOTTLE, draws=(BOTTLE, wider)))
-    x = PROBLEM.box.from_unit(np.array([0.5, 0.4]))
+    x = a_grasp()
     expected = [Simulator(obj=obj).grasp(PROBLEM.pose(x), PROBLEM.posture(x)).quality for obj in (BOTTLE, wider)]
     assert expected[0] != expected[1]
     assert unknown.over_shapes(x).tolist() == expected
@@ -103,7 +107,7 @@ def test_value_over_draws_is_the_mean_over_simulators():
 def test_losses_sum_to_what_is_lost():
     wider = replace(BOTTLE, friction=0.9)
     unknown = PROBLEM.on(replace(BOTTLE, draws=(BOTTLE, wider)))
-    x = PROBLEM.box.from_unit(np.array([0.5, 0.4]))
+    x = a_grasp()
     loss = shape_loss(unknown, x, NOISE, n=5)
     assert loss.nominal - loss.pose - loss.shape == pytest.approx(loss.robust, abs=1e-12)
     known = PROBLEM.on(replace(BOTTLE, draws=(BOTTLE, BOTTLE)))
