@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from surehold.cli import run
+from surehold.errors import InputError
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.shape.views import camera_towards, half_view
 
@@ -36,6 +37,23 @@ def test_a_grasp_of_a_cloud(here, capsys):
     page = (here / "out" / "report.html").read_text()
     assert "surface, known" in page
     assert "surface, unknown" in page
+
+
+def test_touches_move_the_surface_of_a_cloud(here):
+    from surehold.problems.grasp.from_cloud import belief_of_file
+    from surehold.problems.grasp.options import checked_words
+
+    far = {"point": [-0.03, -0.01, 0.05], "normal": [-0.95, -0.3, 0.0]}  # on the side that was not seen
+    (here / "touches.json").write_text(json.dumps({"contacts": [far]}))
+    place = np.array([far["point"]])
+    words = checked_words({"object": "", "cloud": "bottle.npz"})
+    plain, touched = (belief_of_file({**words, "contacts": c})[0].surface for c in ("", "touches.json"))
+    assert abs(plain.value(place)[0]) > 0.001
+    assert abs(touched.value(place)[0]) < 0.2 * abs(plain.value(place)[0])
+    assert touched.deviation(place)[0] < 0.001 < plain.deviation(place)[0]
+    (here / "touches.json").write_text(json.dumps({"contacts": [{"point": [30.0, 0, 50.0], "normal": [1, 0, 0]}]}))
+    with pytest.raises(InputError, match="off the cloud's surface"):
+        belief_of_file({**words, "contacts": "touches.json"})
 
 
 def test_an_exploration(here, capsys):

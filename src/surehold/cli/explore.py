@@ -48,7 +48,7 @@ def explore(
         raise unknown_name("goal", goal, GOALS)
     if options["cloud"]:
         raise InputError("explore touches a known object in simulation; leave --cloud out and give --start view.")
-    input_noise = noise_of(noise or "none", "ubo")
+    input_noise = noise_of(noise or "none", "bo")
     if input_noise is None:
         raise InputError("--noise is none; give what the hand strays, such as 0.03.")
     names = [name.strip() for name in options["variables"].split(",") if name.strip()]

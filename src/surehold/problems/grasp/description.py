@@ -48,7 +48,7 @@ def described_object(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
         from surehold.problems.grasp.from_cloud import object_of_cloud
 
         return object_of_cloud(given)
-    for option in ("camera", "normals", "cloud_noise"):
+    for option in ("camera", "normals", "contacts", "cloud_noise"):
         if given[option]:
             raise InputError(f"{option} is for point clouds; give one with cloud, or leave {option} out.")
     if not name:

@@ -12,11 +12,14 @@ from surehold.errors import InputError, unknown_name
 from surehold.grasping.object.mesh_files import UNITS
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.shape.belief import ShapeBelief
+from surehold.grasping.shape.implicit_surface import surface_of
 from surehold.grasping.shape.prior import PRIORS
+from surehold.problems.grasp.touch import contacts_of_file
 
 __all__ = ["belief_of_file", "object_of_cloud"]
 
 _MOST_SHAPES = 64
+_FARTHEST_TOUCH = 0.1  # off the surface of the cloud [m]
 
 
 def object_of_cloud(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
@@ -75,7 +78,20 @@ def belief_of_file(words: Mapping[str, Any]) -> tuple[ShapeBelief, str]:
     )
     file = Path(words["cloud"])
     belief = belief_of_cloud(cloud, prior, name=file.stem, mass=words["mass"])
-    return belief, "; ".join([f"{file.name}: {len(raw.points):,} points", *cloud.notes])
+    notes = list(cloud.notes)
+    if words["contacts"]:
+        touched = contacts_of_file(words["contacts"])
+        away = float(np.abs(belief.surface.value(touched.points)).max())
+        if away > _FARTHEST_TOUCH:
+            raise InputError(
+                f"a contact of {words['contacts']!r} is {1e3 * away:.0f} mm off the cloud's surface; give points "
+                "in the cloud's frame, in meters."
+            )
+        known = belief.surface
+        learnt = surface_of(known.prior, known.observations + touched, known.std, known.length)
+        belief = belief.with_surface(learnt)
+        notes.append(f"{len(touched.points)} touches")
+    return belief, "; ".join([f"{file.name}: {len(raw.points):,} points", *notes])
 
 
 def _camera(given: str | Sequence[float]) -> NDArray[np.float64] | None:

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from surehold.errors import unknown_name
 from surehold.grasping.choices import CLOSING_MODES, COLLISIONS, CONES, CONTACT_MODELS, QUALITIES
 from surehold.grasping.hand.model import Hand
-from surehold.grasping.shape.prior import PRIORS
 
 __all__ = ["OPTIONS", "THESIS_SIMULATOR", "VARIABLES", "DescribedGrasp", "GraspOption", "GraspOptions", "checked_words"]
 
@@ -112,11 +111,15 @@ class DescribedGrasp(GraspOptions, total=False):
         str | Sequence[float], GraspOption("", "Where the cloud was seen from: x,y,z in the file's unit.")
     ]
     normals: Annotated[bool, GraspOption(False, "Take the normals that the cloud's file holds.", text=bool)]
+    contacts: Annotated[
+        str,
+        GraspOption("", "Touches of a cloud's object, JSON: {contacts: [{point, normal}, ..]} in its frame [m]."),
+    ]
     cloud_noise: Annotated[
         float | None, GraspOption(None, "Standard deviation of a cloud's points [m]; measured by default.", text=float)
     ]
     prior: Annotated[
-        str, GraspOption("mirror", "What a cloud does not show: mirror (of what it shows), box or ellipsoid.", PRIORS)
+        str, GraspOption("mirror", "What a cloud does not show: mirror (of what it shows), box or ellipsoid.")
     ]
     shapes: Annotated[
         int, GraspOption(8, "Equally likely shapes of a cloud that a grasp is to hold; 0: the mean alone.", text=int)
