@@ -43,7 +43,8 @@ def described_object(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
         If the file is refused, or options are given that are not for this kind of object.
     """
     given = checked_words(words)
-    name, unit, mass, frame = (given[key] or None for key in ("object", "unit", "mass", "frame"))
+    name, unit, frame = (given[key] or None for key in ("object", "unit", "frame"))
+    mass = given["mass"]  # 0 is wrong, not absent
     if given["cloud"]:
         from surehold.problems.grasp.from_cloud import object_of_cloud
 
@@ -61,7 +62,7 @@ def described_object(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
         return shipped_object(name), ""
     from surehold.grasping.object.mesh_files import load_mesh
 
-    loaded = load_mesh(name, unit, given["mass"], frame or "auto")
+    loaded = load_mesh(name, unit, mass, frame or "auto")
     return loaded.object, loaded.diagnosis
 
 

@@ -64,6 +64,8 @@ def belief_of_file(words: Mapping[str, Any]) -> tuple[ShapeBelief, str]:
         raise unknown_name("prior shape", prior, PRIORS)
     if noise is not None and not 0.0 < noise <= 0.02:
         raise InputError(f"cloud-noise is {noise!r} m; give a standard deviation above 0 and up to 0.02 m.")
+    if words["mass"] is not None and not 0.0 < words["mass"] <= 100.0:
+        raise InputError(f"mass is {words['mass']!r}; give kilograms above 0 and up to 100.")
     raw = read_cloud(words["cloud"])
     if words["normals"] and raw.normals is None:
         raise InputError(f"{words['cloud']!r} holds no normals; leave --normals out, they are estimated then.")
