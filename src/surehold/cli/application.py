@@ -5,6 +5,7 @@ import typer
 from surehold import __version__
 from surehold.cli.campaign import campaigns
 from surehold.cli.doctor import doctor
+from surehold.cli.explore import explore
 from surehold.cli.grasp import grasp
 from surehold.cli.maximize import maximize
 from surehold.cli.scene import scene
@@ -25,6 +26,7 @@ def application() -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.command()(grasp)
+    app.command()(explore)
     app.command()(scene)
     for direction, extreme in (("maximize", "maximum"), ("minimize", "minimum")):
         app.command(direction, help=f"Find a {extreme} that still holds when the input is off.")(maximize)

@@ -47,8 +47,8 @@ class Outcomes:
         return self._kept[key]
 
     def __call__(self, x: Any) -> float:
-        """Return the quality at x (d,)."""
-        return self.grasp(x).quality
+        """Return the quality at x (d,); where the shape is not known, its mean over the shapes."""
+        return self.problem(x) if self.problem.object.draws else self.grasp(x).quality
 
 
 def simulator_preset(preset: str) -> str:
@@ -68,8 +68,11 @@ def simulator_preset(preset: str) -> str:
 def grasp(
     obj: Annotated[
         str,
-        typer.Argument(metavar="OBJECT", help="mug, bottle, glass, drill, or a mesh file (STL, OBJ, PLY, glTF, GLB)."),
-    ],
+        typer.Argument(
+            metavar="[OBJECT]",
+            help="mug, bottle, glass, drill, or a mesh file (STL, OBJ, PLY, glTF, GLB); of a point cloud see --cloud.",
+        ),
+    ] = "",
     method: Method = "ubo",
     trials: Trials = 100,
     initial: Initial = 40,
@@ -91,9 +94,7 @@ def grasp(
     from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats import grasp_to_dict
-    from surehold.grasping.pictures.scene import grasp_scene
     from surehold.problems.grasp.description import described_grasp
-    from surehold.reports import gather
     from surehold.reports.run_report import Candidate, RunReport
     from surehold.reports.still import still_picture
     from surehold.store.atomic import write_file
@@ -125,10 +126,9 @@ def grasp(
             status=outcome.status,
             pose=f"palm at ({position}) mm, quaternion ({turn}), s1 = {outcome.s1:.2f} rad",
             details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
+            | losses(problem, candidate.x, input_noise, seed)
             | physics,
-            scene=replace(
-                gather.drawn_scene(grasp_scene(problem.simulator, outcome)), neighbors=neighbors_of(problem, candidate)
-            ),
+            scene=replace(drawn(problem, outcome), neighbors=neighbors_of(problem, candidate)),
         )
 
     def also_write(report: RunReport, folder: Path) -> None:
@@ -178,6 +178,36 @@ def grasp(
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)
+
+
+def drawn(problem: Any, outcome: Any) -> Any:
+    """Return the scene of a grasp; an object of unknown shape is colored by how uncertain its surface is."""
+    from surehold.grasping.pictures.scene import grasp_scene
+    from surehold.reports.gather import grasp_scene as as_drawn
+    from surehold.reports.uncertain_shape import shape_meshes
+
+    scene = as_drawn(grasp_scene(problem.simulator, outcome))
+    body = problem.object
+    if not body.draws:
+        return scene
+    away = np.stack([draw.distances.distance(body.vertices) for draw in body.draws])
+    meshes = shape_meshes(body.vertices, body.faces, np.sqrt(np.mean(away**2, axis=0)))
+    return replace(scene, meshes=(*meshes, *scene.meshes[1:]))
+
+
+def losses(problem: Any, x: Any, noise: Any, seed: int) -> dict[str, str]:
+    """Return what a grasp of an object of unknown shape loses to the pose and to the shape, in words."""
+    from surehold.problems.grasp.shape_loss import shape_loss
+
+    if not problem.object.draws or noise is None:
+        return {}
+    loss = shape_loss(problem, x, noise, seed=seed)
+    return {
+        "on the mean shape": f"{loss.nominal:.3f}",
+        "lost to the pose": f"{loss.pose:.3f}",
+        "lost to the unknown shape": f"{loss.shape:.3f}",
+        "left under both": f"{loss.robust:.3f}",
+    }
 
 
 def neighbors_of(problem: Any, candidate: Any) -> Any:

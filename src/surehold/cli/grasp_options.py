@@ -34,7 +34,7 @@ def takes_grasp_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def object_of(described: dict[str, Any], console: Console) -> Any:
-    """Return the object of a description; of a mesh the diagnosis is said and the distances are computed.
+    """Return the object of a description; of a file the diagnosis is said and the distances are computed.
 
     Raises
     ------
@@ -43,8 +43,10 @@ def object_of(described: dict[str, Any], console: Console) -> Any:
     """
     from surehold.problems.grasp.description import described_object
 
-    body, diagnosis = described_object(*(described[name] for name in ("object", "unit", "mass", "frame")))
-    if diagnosis:
+    body, diagnosis = described_object(described)
+    if body.distances is not None:
+        console.print(diagnosis, markup=False, soft_wrap=True)
+    elif diagnosis:
         from surehold.grasping.object.distance_field import distance_field_of
 
         console.print(diagnosis, markup=False, soft_wrap=True)

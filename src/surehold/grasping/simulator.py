@@ -185,12 +185,16 @@ class Simulator:
 
         `pose` is from the palm frame to the object's frame, `joints` (f, j) [rad or m]; 0 for fewer than two contacts.
         """
-        angles = np.ascontiguousarray(joints, dtype=np.float64)
-        contacts = as_contacts(self._skin(self._place(pose), angles), self.hand)
+        contacts = self.contacts_at(pose, joints)
         if len(contacts) < 2:
             return 0.0
         wrench = self.measure.wrench(contacts.points, contacts.normals, contacts.weights)
         return float(self.measure.value(contacts.points, contacts.normals, wrench))
+
+    def contacts_at(self, pose: Pose, joints: ArrayLike) -> Contacts:
+        """Return the skin's contacts of the hand as it stands, see `quality_at`."""
+        angles = np.ascontiguousarray(joints, dtype=np.float64)
+        return as_contacts(self._skin(self._place(pose), angles), self.hand)
 
     def gaps(self, pose: Pose, joints: ArrayLike, geometry: _Geometry | None = None) -> Array:
         """Return the gaps (f j + 1,) between the object and the hand's bodies at rest [m], the palm last.

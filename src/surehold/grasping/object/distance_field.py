@@ -75,7 +75,7 @@ def distance_field_of(
     progress: Callable[[float], None] = lambda share: None,
     margin: float = MARGIN,
 ) -> DistanceField:
-    """Return the distance field of an object, from the cache folder or computed and stored there.
+    """Return the distance field of an object: its own, one from the cache folder, or computed and stored there.
 
     A cache folder that cannot be written costs time at the next start and nothing else. The cell is `CELL` for the
     shipped objects, and for a mesh the larger of that and what keeps the grid to 2 million nodes (1 million from
@@ -87,6 +87,8 @@ def distance_field_of(
     InputError
         If the cell is not a positive number, or the object is so large that the grid would not fit into memory.
     """
+    if obj.distances is not None:
+        return obj.distances
     lower, upper = obj.vertices.min(axis=0), obj.vertices.max(axis=0)
     if cell is None:
         cell = CELL if obj.solids else _mesh_cell(upper - lower + 2.0 * margin, len(obj.faces))

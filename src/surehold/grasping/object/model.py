@@ -6,12 +6,16 @@ object are those of its frame (shipped.py) and for a mesh file are found by mesh
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
 from surehold.grasping.object.solids import Solid
+
+if TYPE_CHECKING:
+    from surehold.grasping.object.distance_field import DistanceField
 
 __all__ = ["GraspObject"]
 
@@ -28,6 +32,8 @@ class GraspObject:
     friction: float = 0.5  #: coefficient of friction at a contact with the hand
     solids: tuple[Solid, ...] = field(default=(), repr=False)  #: the exact solids; empty for a mesh read from a file
     axes: NDArray[np.float64] = field(default_factory=lambda: np.eye(3), repr=False)  #: (3, 3) columns: axes of its box
+    distances: "DistanceField | None" = field(default=None, repr=False)  #: where they are known; else they are computed
+    draws: "tuple[GraspObject, ...]" = field(default=(), repr=False)  #: equally likely shapes, if its own is unknown
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.friction) and self.friction > 0.0):

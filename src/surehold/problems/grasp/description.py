@@ -26,7 +26,7 @@ def described_grasp(
         If a name is unknown, a file is refused, or a value is out of range.
     """
     given = checked_words(words)
-    body = obj or described_object(given["object"], given["unit"], given["mass"], given["frame"])[0]
+    body = obj or described_object(given)[0]
     hand = described_hand(given["hand"], given["hand_config"])
     # A command line says every option: what has its default does not contradict a preset.
     unsaid = {name for name in THESIS_SIMULATOR if given[name] == OPTIONS[name].default}
@@ -34,23 +34,35 @@ def described_grasp(
     return GraspProblem(body, given["facet"], given["variables"], **(options | {"hand": hand}), progress=progress)
 
 
-def described_object(name: str, unit: str, mass: float | None, frame: str | None) -> tuple[GraspObject, str]:
-    """Return a shipped object, or the mesh of a file, and the diagnosis of a mesh.
+def described_object(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
+    """Return a shipped object, the mesh of a file or what a point cloud says, and the diagnosis of a file.
 
     Raises
     ------
     InputError
-        If the file is refused, or options of a mesh are given for a shipped object.
+        If the file is refused, or options are given that are not for this kind of object.
     """
+    given = checked_words(words)
+    name, unit, frame = (given[key] or None for key in ("object", "unit", "frame"))
+    mass = given["mass"]  # 0 is wrong, not absent
+    if given["cloud"]:
+        from surehold.problems.grasp.from_cloud import object_of_cloud
+
+        return object_of_cloud(given)
+    for option in ("camera", "normals", "contacts", "cloud_noise"):
+        if given[option]:
+            raise InputError(f"{option} is for point clouds; give one with cloud, or leave {option} out.")
+    if not name:
+        raise InputError(f"no object is given; name one of {', '.join(OBJECTS)}, a mesh file, or a cloud.")
     if name in OBJECTS or not (Path(name).suffix or Path(name).exists()):
-        options = {"unit": unit or None, "mass": mass, "frame": frame or None}
-        given = [option for option, value in options.items() if value is not None]
-        if name in OBJECTS and given:
-            raise InputError(f"{given[0]} is for mesh files; '{name}' is shipped with its own size and mass.")
+        options = {"unit": unit, "mass": mass, "frame": frame}
+        asked = [option for option, value in options.items() if value is not None]
+        if name in OBJECTS and asked:
+            raise InputError(f"{asked[0]} is for mesh files; '{name}' is shipped with its own size and mass.")
         return shipped_object(name), ""
     from surehold.grasping.object.mesh_files import load_mesh
 
-    loaded = load_mesh(name, unit or None, mass, frame or "auto")
+    loaded = load_mesh(name, unit, mass, frame or "auto")
     return loaded.object, loaded.diagnosis
 
 

@@ -102,10 +102,28 @@ class DescribedGrasp(GraspOptions, total=False):
     variables: Annotated[
         Sequence[str], GraspOption(("dx", "dy"), f"Free variables, of {','.join(VARIABLES)}.", text=list)
     ]
-    unit: Annotated[str, GraspOption("", "Unit of a mesh file: mm, cm, m or in.")]
+    unit: Annotated[str, GraspOption("", "Unit of a mesh file or a cloud: mm, cm, m or in.")]
     mass: Annotated[float | None, GraspOption(None, "Mass of a mesh [kg]; by default that of water.", text=float)]
     frame: Annotated[str | None, GraspOption(None, "Axes of a mesh's box: file, principal, or auto (the smaller).")]
     hand_config: Annotated[str, GraspOption("", "YAML description of a hand's model file: palm, fingers, preshapes.")]
+    cloud: Annotated[str, GraspOption("", "Point cloud of the object instead: .ply, .pcd, .xyz or .npz.")]
+    camera: Annotated[
+        str | Sequence[float], GraspOption("", "Where the cloud was seen from: x,y,z in the file's unit.")
+    ]
+    normals: Annotated[bool, GraspOption(False, "Take the normals that the cloud's file holds.", text=bool)]
+    contacts: Annotated[
+        str,
+        GraspOption("", "Touches of a cloud's object, JSON: {contacts: [{point, normal}, ..]} in its frame [m]."),
+    ]
+    cloud_noise: Annotated[
+        float | None, GraspOption(None, "Standard deviation of a cloud's points [m]; measured by default.", text=float)
+    ]
+    prior: Annotated[
+        str, GraspOption("mirror", "What a cloud does not show: mirror (of what it shows), box or ellipsoid.")
+    ]
+    shapes: Annotated[
+        int, GraspOption(8, "Equally likely shapes of a cloud that a grasp is to hold; 0: the mean alone.", text=int)
+    ]
 
 
 _HINTS = get_type_hints(DescribedGrasp, include_extras=True)

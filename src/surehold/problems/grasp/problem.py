@@ -11,6 +11,7 @@ from the box center within h/3 and h/3 + 40 mm (1 + h / 50 mm), turns within ±4
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from typing import Any, Final, Unpack
 
 import numpy as np
@@ -37,7 +38,8 @@ class GraspProblem:
     Parameters
     ----------
     obj
-        Name of a shipped object ("mug", "bottle", "glass", "drill") or a `GraspObject`.
+        Name of a shipped object ("mug", "bottle", "glass", "drill") or a `GraspObject`. Of one that has `draws`, the
+        value of a grasp is the mean quality over these shapes; poses are relative to the object itself.
     facet
         One of the 24 modes, "facet-thumb": the facet of the object's box that the palm faces, then the neighboring
         facet against which the thumb comes to press. By default "right-front", for the drill "bottom-front".
@@ -102,6 +104,7 @@ class GraspProblem:
         facet = facet or default_facet(body)
         axes = facet_axes(facet)
         self.object: Final[GraspObject] = body
+        self._placed: GraspObject = body  # whose box the poses are relative to
         self.facet: Final[str] = facet
         self.name: Final[str] = f"{body.name}, {facet}"
         if preset not in OPTIONS["preset"].choices:
@@ -114,6 +117,7 @@ class GraspProblem:
         self._settings: dict[str, Any] = given | (THESIS_SIMULATOR if preset else {})
         self._settings["preshape"] = given["preshape"] or None
         self._simulator: Simulator | None = None
+        self._others: tuple[Simulator, ...] | None = None
         self._simulator = self._build()
         chosen = preshape_of(self._simulator.hand, self._simulator.preshape)
         self._s1_range = chosen.s1_range if preset else chosen.s1_useful
@@ -143,6 +147,10 @@ class GraspProblem:
         """Return the pose of the palm in the object's frame at x (d,)."""
         return self._pose(self._values(self._one(x)))
 
+    def posture(self, x: ArrayLike) -> float:
+        """Return the posture variable s1 at x (d,) [rad]."""
+        return self._values(self._one(x))["s1"]
+
     def grasp(self, x: ArrayLike) -> Grasp:
         """Return the whole outcome of the trial at x (d,)."""
         values = self._values(self._one(x))
@@ -151,8 +159,30 @@ class GraspProblem:
     def __call__(self, x: ArrayLike) -> float | NDArray[np.float64]:
         """Return the quality at x (d,) as a float, or the qualities at x (n, d) as an array (n,)."""
         points, single = checked_points(x, self.box)
-        values = [self.grasp(point).quality for point in points]
+        values = [self._value(point) for point in points]
         return values[0] if single else np.array(values)
+
+    def over_shapes(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Return the quality of the trial at x (d,) on each of the object's draws (b,), or on itself where it has none.
+
+        A trial on a draw is made at the pose relative to the mean shape: the hand does not know which shape is there.
+        """
+        values = self._values(self._one(x))
+        if not self.object.draws:
+            return np.array([self.simulator.grasp(self._pose(values), values["s1"]).quality])
+        if self._others is None:
+            self._others = tuple(self._build(draw) for draw in self.object.draws)
+        pose = self._pose(values)
+        return np.array([simulator.grasp(pose, values["s1"]).quality for simulator in self._others])
+
+    def on(self, obj: GraspObject) -> "GraspProblem":
+        """Return the problem with the same poses and settings, with another object in the place of this one."""
+        other = copy(self)
+        vars(other).update(object=obj, _simulator=None, _others=None, _placed=self._placed)
+        return other
+
+    def _value(self, x: NDArray[np.float64]) -> float:
+        return float(self.over_shapes(x).mean()) if self.object.draws else self.grasp(x).quality
 
     def _one(self, x: ArrayLike) -> NDArray[np.float64]:
         points, _ = checked_points(x, self.box)
@@ -164,7 +194,7 @@ class GraspProblem:
 
     def _pose(self, values: dict[str, float]) -> Pose:
         offsets = [values[name] for name in ("dx", "dy", "dz", "rx", "ry", "rz")]
-        return default_pose(self.simulator.hand, self.object, self.facet, self.default.standoff, offsets)
+        return default_pose(self.simulator.hand, self._placed, self.facet, self.default.standoff, offsets)
 
     def _values(self, x: NDArray[np.float64]) -> dict[str, float]:
         return self._fixed | self.box.as_dict(x)
@@ -184,12 +214,12 @@ class GraspProblem:
             "s1": self._s1_range,
         }
 
-    def _build(self) -> Simulator:
+    def _build(self, obj: GraspObject | None = None) -> Simulator:
         settings = dict(self._settings)
-        return Simulator(settings.pop("hand"), self.object, **settings)
+        return Simulator(settings.pop("hand"), obj or self.object, **settings)
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_simulator": None}
+        return self.__dict__ | {"_simulator": None, "_others": None}
 
     def __repr__(self) -> str:
         return f"<grasp {self.name}: {self._settings['contact']} contacts, {self.box!r}>"

@@ -1,0 +1,223 @@
+"""Shapes from half views and from touch: `python -m benchmarks.unknown_shapes shape|grasp|explore|time --rows FILE`.
+
+shape    distance of the true surface to the one believed [mm], mean and 95 %, of half views of 500, 2,000 and 5,000
+         points with 0, 1 and 3 mm noise, and the share of true surface points in the believed 95 % interval, of what
+         the camera saw and of what it did not. `--training` takes shapes that are not the shipped ones: the spread of
+         mirrored shapes (surehold.grasping.shape.completion.SPREAD) was chosen on these
+grasp    a grasp is planned on a half view (1,000 points, 1 mm): on 8 draws of the shape, on the mean surface alone, and
+         on the cloud mirrored and believed; then it is queried 200 times on the true shape under input noise
+explore  from a box: the true worth of the recommendation after 20 and 40 trials, beside optimization without a shape
+time     of an update of the shape with 200 contacts
+
+Every finished case is a line of the rows' file: a benchmark that is stopped goes on where it was. Cases are numbered by
+`--views`, from `--first`; cameras look from the side or from above, 5 to 50 degrees.
+"""
+
+import argparse
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+import surehold as sh
+from surehold.grasping.object.distance_field import distance_field_of
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.shipped import OBJECTS, shipped_object
+from surehold.grasping.object.solids import RevolvedProfile, RoundedBox, triangles
+from surehold.grasping.shape.completion import SPREAD, belief_of_cloud
+from surehold.grasping.shape.implicit_surface import Observations
+from surehold.grasping.shape.point_cloud import cleaned
+from surehold.grasping.shape.views import camera_towards, half_view, hidden_mask, surface_points
+from surehold.problems.grasp.exploration import Exploration, belief_of_box
+from surehold.problems.grasp.problem import GraspProblem
+from surehold.problems.grasp.touch import touch_trial
+
+NOISE = sh.InputNoise.unit(0.03)
+TRIALS, INITIAL = 40, 20
+
+
+def solid_object(name, solids):
+    vertices, faces, volume, center = triangles(solids)
+    return GraspObject(name, vertices, faces, 1000.0 * volume, center, 0.5, solids)
+
+
+def training_objects():
+    """Return a carton, a can on a foot, and a hammer."""
+    carton = RoundedBox((0.0, 0.0, 0.07), (0.045, 0.03, 0.07), 0.003)
+    corners = ((0.0, 0.002), (0.034, 0.002), (0.034, 0.012), (0.02, 0.03), (0.03, 0.05), (0.03, 0.11), (0.0, 0.11))
+    handle = RevolvedProfile(((0.0, 0.0), (0.016, 0.0), (0.012, 0.14), (0.0, 0.14)), 0.002)
+    head = RoundedBox((0.0, 0.0, 0.15), (0.05, 0.017, 0.017), 0.004)
+    return {
+        "carton": solid_object("carton", (carton,)),
+        "can": solid_object("can", (RevolvedProfile(corners, 0.002),)),
+        "hammer": solid_object("hammer", (handle, head)),
+    }
+
+
+def view_of(obj, view, n, noise):
+    rng = np.random.default_rng([view, 7])
+    camera = camera_towards(obj, rng.uniform(0.0, 2.0 * np.pi), np.radians(rng.uniform(5.0, 50.0)))
+    return camera, cleaned(half_view(obj, camera, n, noise, rng), camera=camera)
+
+
+def shape(objects, args):
+    for name, obj in objects.items():
+        field = distance_field_of(obj)
+        for n in args.points:
+            for noise in args.noises:
+                for view in range(args.first, args.first + args.views):
+                    key = {"object": name, "n": n, "noise": noise, "view": view, "spread": args.spread}
+                    if known(args, key):
+                        continue
+                    camera, cloud = view_of(obj, view, n, 1e-3 * noise)
+                    started = time.process_time()
+                    belief = belief_of_cloud(cloud, spread=(args.spread, SPREAD[1]))
+                    mean = belief.mean_object()
+                    seconds = time.process_time() - started
+                    places = surface_points(obj, 1000, np.random.default_rng(0))[0]
+                    hidden = hidden_mask(field, places, camera)
+                    away = 1e3 * np.abs(mean.distances.distance(places))
+                    inside = np.abs(belief.surface.value(places)) < 1.96 * belief.surface.deviation(places)
+                    row = {
+                        "mean": away.mean(),
+                        "tail": np.quantile(away, 0.95),
+                        "seen": away[~hidden].mean(),
+                        "hidden": away[hidden].mean(),
+                        "covered seen": inside[~hidden].mean(),
+                        "covered hidden": inside[hidden].mean(),
+                        "cpu": seconds,
+                    }
+                    write(args, key, row)
+    table(args, ("object", "n", "noise", "spread"))
+
+
+def grasp(objects, args):
+    for name, obj in objects.items():
+        for view in range(args.first, args.first + args.views):
+            key = {"object": name, "view": view}
+            if known(args, key):
+                continue
+            _, cloud = view_of(obj, view, 1000, 0.001)
+            belief = belief_of_cloud(cloud, name=name, mass=obj.mass, friction=obj.friction)
+            mean, *draws = belief.objects(8, np.random.default_rng(0))
+            trusted = belief_of_cloud(cloud, name=name, mass=obj.mass, friction=obj.friction, spread=(0.01, SPREAD[1]))
+            problem = GraspProblem(mean)
+            real = problem.on(obj)
+            row = {}
+            for method, body in (
+                ("robust", replace(mean, draws=tuple(draws))),
+                ("mean surface", mean),
+                ("mirrored", trusted.mean_object()),
+            ):
+                planned = problem.on(body)
+                result = sh.maximize(planned, problem.box, TRIALS, input_noise=NOISE, n_initial=INITIAL, seed=view)
+                row[method] = sh.problems.robust_score(real, result.recommendation.x, NOISE, n=200, seed=1).mean
+            write(args, key, row)
+    table(args, ("object",))
+    rows = read(args)
+    for other in ("mean surface", "mirrored"):
+        gain = np.array([row["robust"] - row[other] for row in rows])
+        print(f"robust - {other}: {gain.mean():+.4f} +- {gain.std(ddof=1) / np.sqrt(len(gain)):.4f}, {len(gain)} views")
+
+
+def explore(objects, args):
+    variables = ("dx", "dy", "dz", "rx", "ry", "rz", "s1")
+    for name, obj in objects.items():
+        for seed in range(args.first, args.first + args.views):
+            key = {"object": name, "seed": seed}
+            if known(args, key):
+                continue
+            belief = belief_of_box(obj)
+            problem = GraspProblem(belief.mean_object(), variables=variables)
+            real = problem.on(obj)
+
+            def true(x, real=real):
+                return sh.problems.robust_score(real, x, NOISE, n=200, seed=1).mean
+
+            run = Exploration(problem, belief, NOISE, seed=seed)
+            row = {}
+            started = time.process_time()
+            for k in range(TRIALS):
+                x = run.ask()
+                touch = touch_trial(real.simulator, problem.pose(x), problem.posture(x))
+                run.tell(x, touch.grasp.quality, touch.observations)
+                if k + 1 in (20, 40):
+                    row[f"explored {k + 1}"] = true(run.recommend().x)
+            row["cpu"] = time.process_time() - started
+            optimizer = sh.Optimizer(problem.box, input_noise=NOISE, seed=seed, n_initial=20)
+            for k in range(100):
+                x = optimizer.ask()
+                optimizer.tell(x, real(x))
+                if k + 1 in (20, 40, 100):
+                    row[f"today {k + 1}"] = true(optimizer.recommend().x)
+            write(args, key, row)
+    table(args, ("object",))
+
+
+def timed(objects, args):
+    for name, obj in objects.items():
+        belief = belief_of_box(obj)
+        places, normals = surface_points(obj, 200, np.random.default_rng(0))
+        told = Observations(places, np.zeros(200), np.full(200, 5e-4), places, normals, np.full(200, 0.15))
+        run = Exploration(GraspProblem(obj), belief, NOISE)
+        run.tell(GraspProblem(obj).box.lower, 0.0, told)
+        one = replace(told, **{key: getattr(told, key)[:1] for key in ("points", "values", "noise")})
+        one = replace(one, **{key: getattr(told, key)[:1] for key in ("slope_points", "slopes", "slope_noise")})
+        best = np.inf
+        for _ in range(5):
+            started = time.process_time()
+            run.tell(GraspProblem(obj).box.lower, 0.0, one)
+            update = time.process_time() - started
+            field = run.belief.mean_object()
+            best = min(best, time.process_time() - started)
+        print(f"{name}: surface {1e3 * update:.0f} ms, with its distances and mesh {1e3 * best:.0f} ms CPU", field.name)
+
+
+def read(args):
+    return [json.loads(line) for line in Path(args.rows).read_text().splitlines()] if Path(args.rows).exists() else []
+
+
+def known(args, key):
+    return any(all(row.get(k) == v for k, v in key.items()) for row in read(args))
+
+
+def write(args, key, row):
+    with Path(args.rows).open("a") as file:
+        file.write(json.dumps(key | {name: round(float(value), 5) for name, value in row.items()}) + "\n")
+
+
+def table(args, names):
+    rows = read(args)
+    for group in dict.fromkeys(tuple(row[name] for name in names) for row in rows):
+        mine = [row for row in rows if tuple(row[name] for name in names) == group]
+        numbers = [key for key in mine[0] if key not in (*names, "view", "seed")]
+        shown = []
+        for key in numbers:
+            values = np.array([row[key] for row in mine])
+            error = values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else np.nan
+            shown.append(f"{key} {values.mean():.3g} +- {error:.2g}")
+        print(*group, f"({len(mine)})", ", ".join(shown))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("shape", "grasp", "explore", "time"))
+    parser.add_argument("--rows", default="/dev/null")
+    parser.add_argument("--views", type=int, default=3)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--objects", default=",".join(OBJECTS))
+    parser.add_argument("--training", action="store_true")
+    parser.add_argument("--points", type=int, nargs="+", default=[500, 2000, 5000])
+    parser.add_argument("--noises", type=float, nargs="+", default=[0.0, 1.0, 3.0])
+    parser.add_argument("--spread", type=float, default=SPREAD[0])
+    args = parser.parse_args()
+    objects = training_objects() if args.training else {n: shipped_object(n) for n in args.objects.split(",")}
+    with threadpool_limits(1):
+        {"shape": shape, "grasp": grasp, "explore": explore, "time": timed}[args.what](objects, args)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,280 @@
+"""A point cloud made ready to learn a shape from: cleaned, thinned, with normals and noise.
+
+In this order: points that are not finite are dropped; the unit is checked; of millions of points a regular part is
+taken; a table under the object is found and taken off; points far from their neighbors are dropped, and groups of a few
+points that lie apart; a second object is refused; the rest is thinned to cubes of equal size, whose means have less
+noise; the noise is measured as the scatter about local planes.
+Distances to neighbors are those of SciPy's k-d tree.
+"""
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError
+
+__all__ = ["MOST_POINTS", "PointCloud", "Table", "cleaned"]
+
+Array = NDArray[np.float64]
+
+MOST_POINTS: Final = 2500  #: from which a surface is learnt; more are thinned to it: dense algebra costs their cube
+_MOST_READ: Final = 60_000  # points that are looked at; of more, each n-th
+_LEAST_POINTS: Final = 20
+_LARGEST, _SMALLEST = 0.6, 0.005  # extent of what a hand can grasp [m]
+_NEIGHBORS: Final = 12
+_LEAST_NOISE: Final = 0.0003  # of a thinned point [m]
+_APART: Final = 0.012  # gap between two objects [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """The plane on which the object stands: normal . x = height."""
+
+    normal: Array  #: (3,) unit length, towards the object
+    height: float  #: m
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """Points of an object's surface, in meters."""
+
+    points: Array = field(repr=False)  #: (n, 3)
+    normals: Array = field(repr=False)  #: (n, 3) unit length, outward
+    noise: Array = field(repr=False)  #: (n,) standard deviation along the normal [m]
+    camera: Array | None = None  #: (3,)
+    table: Table | None = None
+    notes: tuple[str, ...] = ()  #: what was found and done, one sentence each
+
+
+def cleaned(
+    points: Array,
+    normals: Array | None = None,
+    camera: Array | None = None,
+    noise: float | None = None,
+    most: int = MOST_POINTS,
+) -> PointCloud:
+    """Return a cloud that a shape can be learnt from.
+
+    Parameters
+    ----------
+    points
+        (n, 3) m; rows that are not finite are dropped.
+    normals
+        (n, 3) of any length; estimated from neighbors if not given. Their sign is set towards the camera if that is
+        known; else, of estimated ones, away from the middle of the cloud.
+    camera
+        (3,) m, where the cloud was seen from.
+    noise
+        Standard deviation of a point [m]; measured as the scatter about local planes if not given.
+    most
+        Points that are kept.
+
+    Raises
+    ------
+    InputError
+        If too few points are left, they lie on a line, the unit is wrong, or there are two objects.
+    """
+    notes: list[str] = []
+    if normals is not None:
+        points = np.column_stack([points, normals])
+    finite = np.all(np.isfinite(points), axis=1)
+    if not np.all(finite):
+        notes.append(f"{int(np.sum(~finite)):,} of {len(points):,} points are not finite and were left out")
+        points = points[finite]
+    _enough(points, "finite ")
+    if len(points) > _MOST_READ:
+        step = -(-len(points) // _MOST_READ)
+        notes.append(f"of {len(points):,} points each {step}th was taken")
+        points = points[::step]
+    points = _without_twins(points)
+    _enough(points, "different ")
+    _check_unit(points[:, :3])
+    table, kept = _table(points[:, :3], camera)
+    if table is not None:
+        notes.append(f"a table of {int(np.sum(~kept)):,} points was taken off")
+        points = points[kept]
+        _enough(points, "table aside, ")
+    points = _largest_object(points, camera, notes)
+    _enough(points, "clean ")
+    size = np.ptp(points[:, :3], axis=0)
+    spread = np.linalg.svd(points[:, :3] - points[:, :3].mean(axis=0), compute_uv=False) / np.sqrt(len(points))
+    if spread[1] < max(0.02 * spread[0], 0.0005):
+        raise InputError(
+            f"the cloud's {len(points):,} points lie on a line of {1e3 * np.linalg.norm(size):.0f} mm; a surface is "
+            "needed: check the columns of the file, or turn the camera."
+        )
+    place, outward, scatter = _planes(points[:, :3], camera)
+    if normals is not None:
+        given = points[:, 3:] / np.maximum(np.linalg.norm(points[:, 3:], axis=1), 1e-12)[:, None]
+        # A normal of length zero says nothing: the estimated one stands for it.
+        outward = np.where(np.linalg.norm(points[:, 3:], axis=1)[:, None] > 1e-6, given, outward)
+        if camera is not None:
+            outward *= np.where(np.sum(outward * (camera - place), axis=1) < 0.0, -1.0, 1.0)[:, None]
+    sigma = float(np.median(scatter)) if noise is None else float(noise)
+    place, outward, count = _thinned(place, outward, most)
+    if len(place) < len(points):
+        notes.append(f"{len(points):,} points were thinned to {len(place):,}")
+    each = np.maximum(sigma / np.sqrt(count), _LEAST_NOISE)
+    notes.append(f"noise {1e3 * sigma:.1f} mm" + ("" if noise is not None else ", measured"))
+    if camera is None:
+        notes.append("the camera is not known: give --camera x,y,z, so that what it saw free counts")
+    return PointCloud(place, outward, each, camera, table, tuple(notes))
+
+
+def _enough(points: Array, kind: str) -> None:
+    if len(points) < _LEAST_POINTS:
+        raise InputError(
+            f"the cloud has {len(points)} {kind}points; give {_LEAST_POINTS} or more of the object's surface."
+        )
+
+
+def _check_unit(points: Array) -> None:
+    low, high = np.quantile(points, [0.02, 0.98], axis=0)
+    size = float((high - low).max())
+    if size > 4.0:
+        raise InputError(f"the cloud spans {size:.3g} m; if it is in millimeters, give --unit mm.")
+    if size < _SMALLEST:
+        raise InputError(f"the cloud spans {1e3 * size:.3g} mm; give its --unit: mm, cm, m or in.")
+
+
+def _without_twins(points: Array) -> Array:
+    """Return the points without exact repetitions, in their order."""
+    _, first = np.unique(points[:, :3], axis=0, return_index=True)
+    return points[np.sort(first)]
+
+
+def _table(points: Array, camera: Array | None) -> tuple[Table | None, NDArray[np.bool_]]:
+    """Return the plane under the object, or None, and which points are not of it.
+
+    A table is a plane with at least a fifth of the points, hardly any point beyond it, and more than 1.6 times as wide
+    as what stands on it, both ways: the face of a box is not.
+    """
+    everything = np.ones(len(points), dtype=bool)
+    rng = np.random.default_rng(0)
+    some = points[rng.choice(len(points), min(len(points), 3000), replace=False)]
+    best, count, thick = None, 0, 0.004
+    for _ in range(300):
+        a, b, c = some[rng.choice(len(some), 3, replace=False)]
+        normal = np.cross(b - a, c - a)
+        length = float(np.linalg.norm(normal))
+        if length < 1e-8:
+            continue
+        normal = normal / length
+        inliers = int(np.sum(np.abs((some - a) @ normal) < thick))
+        if inliers > count:
+            best, count = (normal, a), inliers
+    if best is None or count < 0.2 * len(some):
+        return None, everything
+    normal, a = best
+    near = np.abs((points - a) @ normal) < thick
+    middle = points[near].mean(axis=0)
+    normal = np.linalg.svd(points[near] - middle, full_matrices=False)[2][2]
+    height = (points - middle) @ normal
+    up = np.sum(height[np.abs(height) > thick]) if camera is None else (camera - middle) @ normal
+    normal, height = (normal, height) if up >= 0.0 else (-normal, -height)
+    thick = max(thick, 3.0 * float(np.std(height[np.abs(height) < thick])))
+    above = height > thick
+    if np.sum(above) < _LEAST_POINTS or np.sum(height < -thick) > 0.02 * len(points):
+        return None, everything
+    basis = np.linalg.svd(normal[None])[2][1:]
+
+    def width(rows: Array) -> Array:
+        return np.ptp(np.quantile(rows @ basis.T, [0.02, 0.98], axis=0), axis=0)
+
+    if np.any(width(points[~above]) < 1.6 * width(points[above])):
+        return None, everything
+    return Table(normal, float(middle @ normal)), above
+
+
+def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Array:
+    """Return the points without outliers and small groups.
+
+    A part that hides another tears a cloud apart, but not the camera's image of it: groups are of one object if they
+    lie beside each other as the camera sees them.
+
+    Raises
+    ------
+    InputError
+        If a second group is a fifth as large as the first, or larger, and lies apart; or if what is left is too large
+        to be grasped.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    tree = KDTree(points[:, :3])
+    gaps = tree.query(points[:, :3], k=min(9, len(points)))[0][:, 1:].mean(axis=1)
+    usual = float(np.median(gaps))
+    good = gaps < 4.0 * usual
+    if not np.all(good):
+        notes.append(f"{int(np.sum(~good)):,} outliers were left out")
+        points = points[good]
+        tree = KDTree(points[:, :3])
+    near = max(_APART if len(points) < 20_000 else 0.003, 4.0 * usual)  # fewer pairs of a dense cloud
+    pairs = tree.query_pairs(near, output_type="ndarray")
+    ones = np.ones(len(pairs))
+    graph = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    _, group = connected_components(graph, directed=False)
+    sizes = np.bincount(group)
+    order = np.argsort(-sizes, kind="stable")
+    largest = group == order[0]
+    seen = points[:, :3]
+    if camera is not None:  # moved along their rays to one distance
+        ray = seen - camera
+        far = np.linalg.norm(ray, axis=1)
+        seen = ray * (np.median(far) / far)[:, None]
+    first = KDTree(seen[largest])
+    kept = largest.copy()
+    for number in order[1:]:
+        mine = group == number
+        gap = float(first.query(seen[mine])[0].min())
+        if gap < _APART:
+            kept |= mine
+        elif sizes[number] >= 0.2 * sizes[order[0]]:
+            raise InputError(
+                f"the cloud holds two objects of {sizes[order[0]]:,} and {sizes[number]:,} points, "
+                f"{1e3 * gap:.0f} mm apart; give one of them."
+            )
+    if not np.all(kept):
+        notes.append(f"{int(np.sum(~kept)):,} points apart from the object were left out")
+        points = points[kept]
+    size = float(np.ptp(points[:, :3], axis=0).max())
+    if size > _LARGEST:
+        raise InputError(
+            f"the object spans {1e3 * size:.0f} mm, too much for a hand; give the cloud of one object, or its --unit."
+        )
+    return points
+
+
+def _planes(points: Array, camera: Array | None) -> tuple[Array, Array, Array]:
+    """Return the points, outward normals (n, 3) and the scatter (n,) about the plane of the nearest neighbors [m]."""
+    from scipy.spatial import KDTree
+
+    k = min(_NEIGHBORS + 1, len(points))
+    # Of dense clouds the neighbors are taken from a thinned one: noise must not be wider than what it is measured over.
+    near = KDTree(points).query(points, k=k)[1]
+    local = points[near]  # (n, k, 3)
+    middle = local.mean(axis=1, keepdims=True)
+    spread = np.einsum("nki,nkj->nij", local - middle, local - middle) / (k - 3.0)
+    values, vectors = np.linalg.eigh(spread)
+    outward = vectors[:, :, 0]
+    towards = camera - points if camera is not None else points - points.mean(axis=0)
+    outward = outward * np.where(np.sum(outward * towards, axis=1) < 0.0, -1.0, 1.0)[:, None]
+    return points, outward, np.sqrt(np.maximum(values[:, 0], 0.0))
+
+
+def _thinned(points: Array, normals: Array, most: int) -> tuple[Array, Array, Array]:
+    """Return means of the points and normals in cubes, `most` of them or fewer, and how many points each stands for."""
+    edge = 0.0
+    size = float(np.ptp(points, axis=0).max())
+    where = np.arange(len(points))
+    while where.max() + 1 > most:
+        edge = 1.15 * edge if edge else size / 400.0
+        where = np.unique(np.floor(points / edge).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
+    count = np.bincount(where)
+    mean = np.column_stack([np.bincount(where, weights=points[:, i]) for i in range(3)]) / count[:, None]
+    turned = np.column_stack([np.bincount(where, weights=normals[:, i]) for i in range(3)])
+    length = np.linalg.norm(turned, axis=1)
+    return mean, turned / np.where(length > 0.0, length, 1.0)[:, None], count.astype(np.float64)

@@ -1,0 +1,96 @@
+"""`surehold grasp --cloud` and `surehold explore`: what a user types and gets."""
+
+import json
+
+import numpy as np
+import pytest
+
+from surehold.cli import run
+from surehold.errors import InputError
+from surehold.grasping.object.shipped import shipped_object
+from surehold.grasping.shape.views import camera_towards, half_view
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bottle = shipped_object("bottle")
+    camera = camera_towards(bottle, 0.5, 0.3)
+    points = half_view(bottle, camera, 300, 0.001, np.random.default_rng(0))
+    np.savetxt("bottle.xyz", 1000.0 * points)
+    np.savez("bottle.npz", points=points, camera=camera)
+    return tmp_path
+
+
+def surehold(line):
+    return run(line.split())
+
+
+def test_a_grasp_of_a_cloud(here, capsys):
+    line = "grasp --cloud bottle.npz --trials 6 --initial 5 --shapes 2 --noise 0.03 --out out"
+    assert surehold(line) in (0, 3)  # 3: a grasp may be none in so few trials
+    out = capsys.readouterr().out
+    assert "bottle.npz: 300 points" in out
+    assert "lost to the unknown shape" in out
+    result = json.loads((here / "out" / "result.json").read_text())
+    assert result["settings"]["object"] == "bottle"
+    page = (here / "out" / "report.html").read_text()
+    assert "surface, known" in page
+    assert "surface, unknown" in page
+
+
+def test_touches_move_the_surface_of_a_cloud(here):
+    from surehold.problems.grasp.from_cloud import belief_of_file
+    from surehold.problems.grasp.options import checked_words
+
+    far = {"point": [-0.03, -0.01, 0.05], "normal": [-0.95, -0.3, 0.0]}  # on the side that was not seen
+    (here / "touches.json").write_text(json.dumps({"contacts": [far]}))
+    place = np.array([far["point"]])
+    words = checked_words({"object": "", "cloud": "bottle.npz"})
+    plain, touched = (belief_of_file({**words, "contacts": c})[0].surface for c in ("", "touches.json"))
+    assert abs(plain.value(place)[0]) > 0.001
+    assert abs(touched.value(place)[0]) < 0.2 * abs(plain.value(place)[0])
+    assert touched.deviation(place)[0] < 0.001 < plain.deviation(place)[0]
+    (here / "touches.json").write_text(json.dumps({"contacts": [{"point": [30.0, 0, 50.0], "normal": [1, 0, 0]}]}))
+    with pytest.raises(InputError, match="off the cloud's surface"):
+        belief_of_file({**words, "contacts": "touches.json"})
+
+
+def test_an_exploration(here, capsys):
+    assert surehold("explore bottle --trials 2 --out touched") == 0
+    out = capsys.readouterr().out
+    assert "After 2 touches" in out
+    found = json.loads((here / "touched" / "explore.json").read_text())
+    assert len(found["trials"]["quality"]) == 2
+    assert [row["touches"] for row in found["after"]] == ["0", "2"]
+    page = (here / "touched" / "explore.html").read_text()
+    assert "true shape" in page
+    assert (here / "touched" / "shape.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("grasp", "no object is given"),
+        ("grasp mug --cloud bottle.npz", "both object 'mug' and a cloud"),
+        ("grasp mug --camera 0,0,0", "camera is for point clouds"),
+        ("grasp --cloud bottle.xyz", "--unit mm"),
+        ("grasp --cloud bottle.xyz --unit mm --camera 0,0", "three numbers"),
+        ("grasp --cloud bottle.xyz --unit furlong", "furlong"),
+        ("grasp --cloud bottle.npz --normals", "holds no normals"),
+        ("grasp --cloud bottle.npz --prior bx", "did you mean 'box'"),
+        ("grasp --cloud bottle.npz --cloud-noise 1", "standard deviation above 0"),
+        ("grasp --cloud bottle.npz --shapes -1", "shapes are -1"),
+        ("grasp --cloud none.ply", "cannot be read"),
+        ("explore mug --goal fun", "goal 'fun' is unknown"),
+        ("explore mug --start half", "start 'half' is unknown"),
+        ("explore mug --trials 0", "--trials is 0"),
+        ("explore mug --noise none", "--noise is none"),
+        ("explore mug --cloud bottle.npz", "leave --cloud out"),
+    ],
+)
+def test_bad_input_is_one_line(line, said, capsys):
+    assert surehold(line) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1

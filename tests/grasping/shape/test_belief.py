@@ -1,0 +1,68 @@
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.grasping.object.distance_field import distance_field_of
+from surehold.grasping.shape.belief import ShapeBelief, grid_of
+from surehold.grasping.shape.implicit_surface import Observations, surface_of
+from surehold.grasping.shape.prior import PriorShape
+
+BOX = PriorShape("box", np.zeros(3), np.eye(3), np.array([0.03, 0.03, 0.04]))
+
+
+@pytest.fixture(scope="module")
+def belief():
+    u = np.random.default_rng(0).standard_normal((30, 3))
+    u = 0.035 * u / np.linalg.norm(u, axis=1)[:, None]
+    u = u[u[:, 0] > 0.0]
+    normals = u[:5] / 0.035
+    told = Observations(u, np.zeros(len(u)), np.full(len(u), 5e-4), u[:5], normals, np.full(5, 0.1))
+    surface = surface_of(BOX, told, 0.006, 0.03)
+    return ShapeBelief(surface, grid_of(surface, 0.006))
+
+
+def test_draws_have_mean_and_deviation_of_the_posterior(belief):
+    from surehold.grasping.shape.level_set import Grid
+
+    grid = Grid(np.full(3, -0.03), 0.02, (3, 3, 3))
+    values = ShapeBelief(belief.surface, grid).values(3000, np.random.default_rng(1)).reshape(3001, -1)
+    mean, std = belief.surface.value(grid.nodes), belief.surface.deviation(grid.nodes)
+    assert values[0] == pytest.approx(mean, abs=1e-12)
+    draws = values[1:]
+    # 400 waves share their frequencies: the kernel itself is off by about 1 / sqrt(400).
+    assert np.abs(draws.mean(axis=0) - mean).max() < 0.1 * std.max()
+    assert draws.std(axis=0) == pytest.approx(std, abs=0.12 * belief.surface.std)
+
+
+def test_draws_pass_through_what_was_measured(belief):
+    objects = belief.objects(3, np.random.default_rng(0))
+    for obj in objects:
+        off = distance_field_of(obj).distance(belief.surface.observations.points)
+        assert np.abs(off).max() < 2.5e-3
+    back = np.array([[-0.03, 0.0, 0.0]])
+    away = [distance_field_of(obj).distance(back)[0] for obj in objects[1:]]
+    assert np.ptp(away) > 1e-3  # not known there
+
+
+def test_draws_follow_from_the_generator_alone(belief):
+    first, second = (belief.values(2, np.random.default_rng(4)) for _ in range(2))
+    assert np.array_equal(first, second)
+    with pytest.raises(InputError, match="random generator"):
+        belief.values(1)
+
+
+def test_values_between_coarse_nodes_are_those_of_all_nodes_near_the_surface(belief):
+    values = belief.values()[0]
+    exact = belief.surface.value(belief.grid.nodes).reshape(values.shape)
+    near = np.abs(exact) < 2.0 * belief.grid.cell
+    assert values[near] == pytest.approx(exact[near], abs=1e-9)
+    assert np.array_equal(values < 0.0, exact < 0.0)
+
+
+def test_mass_and_center_of_a_box(belief):
+    surface = surface_of(BOX, Observations(), 0.006, 0.03)
+    obj = ShapeBelief(surface, grid_of(surface, 0.002)).mean_object()
+    volume = 8.0 * np.prod(BOX.half)  # round edges take a little
+    assert 0.93 * volume < obj.mass / 1000.0 < volume
+    assert np.abs(obj.center_of_mass).max() < 1e-4
+    assert obj.box_half_extents == pytest.approx(BOX.half, abs=2e-4)

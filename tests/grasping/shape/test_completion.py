@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.grasping.object.distance_field import distance_field_of
+from surehold.grasping.object.shipped import shipped_object
+from surehold.grasping.shape.completion import belief_of_cloud, mirrored
+from surehold.grasping.shape.point_cloud import cleaned
+from surehold.grasping.shape.views import camera_towards, half_view, hidden_mask, surface_points
+
+
+def seen(name, azimuth=0.7, n=600):
+    obj = shipped_object(name)
+    camera = camera_towards(obj, azimuth, 0.3)
+    return obj, camera, cleaned(half_view(obj, camera, n, 0.001, np.random.default_rng(0)), camera=camera)
+
+
+def test_half_views_are_on_the_surface_and_seen():
+    obj = shipped_object("mug")
+    camera = camera_towards(obj, 2.0, 0.4)
+    points = half_view(obj, camera, 400, 0.0, np.random.default_rng(0))
+    assert np.abs(distance_field_of(obj).distance(points)).max() < 1e-4
+    assert not hidden_mask(distance_field_of(obj), points, camera).any()
+    with pytest.raises(InputError, match="inside"):
+        half_view(obj, np.array([0.038, 0.0, 0.05]), 10, 0.0, np.random.default_rng(0))
+
+
+def test_a_bottle_is_mirrored_at_a_plane_through_its_axis():
+    _, _, cloud = seen("bottle")
+    other = mirrored(cloud, np.eye(3))
+    assert abs(other.depth) < 0.006  # the axis is at the origin
+    radius = np.linalg.norm(other.points[other.points[:, 2] < 0.09][:, :2], axis=1)
+    assert np.median(np.abs(radius - 0.02625)) < 0.004
+
+
+def test_a_bottle_is_known_where_it_was_seen_and_honest_where_not():
+    obj, camera, cloud = seen("bottle")
+    belief = belief_of_cloud(cloud, mass=0.3)
+    mean = belief.mean_object()
+    assert mean.mass == 0.3
+    places = surface_points(obj, 600, np.random.default_rng(1))[0]
+    hidden = hidden_mask(distance_field_of(obj), places, camera)
+    off = np.abs(distance_field_of(mean).distance(places))
+    assert off[~hidden].mean() < 0.001
+    assert off[hidden].mean() < 0.008
+    deviation = belief.surface.deviation(places)
+    assert deviation[hidden].mean() > 4.0 * deviation[~hidden].mean()
+    inside = np.abs(belief.surface.value(places)) < 1.96 * deviation
+    assert inside[hidden].mean() > 0.8
+
+
+@pytest.mark.parametrize("prior", ["box", "ellipsoid"])
+def test_other_priors_pass_through_the_cloud(prior):
+    _, _, cloud = seen("glass")
+    mean = belief_of_cloud(cloud, prior).mean_object()
+    assert np.abs(distance_field_of(mean).distance(cloud.points)).mean() < 0.0012
+
+
+def test_what_the_camera_saw_free_is_outside():
+    obj, camera, cloud = seen("drill")
+    mean = belief_of_cloud(cloud).mean_object()
+    before = cloud.points + 0.012 * (camera - cloud.points) / np.linalg.norm(camera - cloud.points, axis=1)[:, None]
+    free = distance_field_of(obj).distance(before) > 0.006
+    assert np.mean(distance_field_of(mean).distance(before[free]) > 0.0) > 0.97
+
+
+def test_an_unknown_prior():
+    _, _, cloud = seen("bottle")
+    with pytest.raises(InputError, match="did you mean 'mirror'"):
+        belief_of_cloud(cloud, "miror")

@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.grasping.object.shipped import shipped_object
+from surehold.grasping.shape.point_cloud import cleaned
+from surehold.grasping.shape.views import camera_towards, half_view, surface_points
+
+CAMERA = camera_towards(shipped_object("mug"), 0.4, 0.5)
+
+
+@pytest.fixture(scope="module")
+def mug():
+    return half_view(shipped_object("mug"), CAMERA, 1500, 0.001, np.random.default_rng(0))
+
+
+def table_of(n, rng):
+    return np.column_stack([rng.uniform(-0.3, 0.3, (n, 2)), rng.normal(0.0, 0.0005, n)])
+
+
+def test_noise_is_measured_and_normals_look_at_the_camera(mug):
+    cloud = cleaned(mug, camera=CAMERA)
+    assert cloud.notes[-1] in [f"noise {v} mm, measured" for v in (0.7, 0.8, 0.9, 1.0)]  # across, of 1 mm along the ray
+    assert np.all(np.sum(cloud.normals * (CAMERA - cloud.points), axis=1) >= 0.0)
+    assert np.linalg.norm(cloud.normals, axis=1) == pytest.approx(np.ones(len(cloud.normals)))
+
+
+def test_a_table_is_taken_off_and_a_face_of_a_box_is_not(mug):
+    rng = np.random.default_rng(1)
+    with_table = cleaned(np.vstack([mug, table_of(3000, rng)]), camera=CAMERA)
+    assert with_table.table is not None
+    assert with_table.table.normal == pytest.approx([0.0, 0.0, 1.0], abs=0.02)
+    assert abs(with_table.table.height) < 0.001
+    high = mug[mug[:, 2] > 0.008]
+    assert len(with_table.points) > 0.97 * len(high)
+    assert np.ptp(with_table.points[:, :2], axis=0).max() < 0.13
+    face = rng.uniform(-0.04, 0.04, (800, 3)) * [1.0, 1.0, 0.0]
+    side = rng.uniform(-0.04, 0.04, (800, 3)) * [1.0, 0.0, 1.0] + [0.0, 0.04, -0.04]
+    box = cleaned(np.vstack([face, side]), camera=np.array([0.0, 0.5, 0.5]))
+    assert box.table is None
+
+
+def test_outliers_and_points_that_are_not_finite_are_left_out(mug):
+    rng = np.random.default_rng(2)
+    spoilt = np.vstack([mug, rng.uniform(-0.3, 0.3, (40, 3)), np.full((5, 3), np.nan)])
+    cloud = cleaned(spoilt, camera=CAMERA)
+    assert "5 of 1,545 points are not finite" in cloud.notes[0]
+    assert len(cloud.points) <= 1500
+    nearest = np.linalg.norm(cloud.points[:, None] - mug[None], axis=2).min(axis=1)
+    assert nearest.max() < 0.03
+
+
+def test_many_points_are_thinned_and_gain_precision():
+    mug = shipped_object("mug")
+    dense = half_view(mug, CAMERA, 20_000, 0.002, np.random.default_rng(3))
+    cloud = cleaned(dense, camera=CAMERA)
+    assert len(cloud.points) <= 2500
+    assert np.median(cloud.noise) < 0.001
+
+
+def test_normals_of_a_file_are_turned_to_the_camera(mug):
+    away = -(CAMERA - mug)
+    cloud = cleaned(mug, normals=away, camera=CAMERA)
+    rays = (CAMERA - cloud.points) / np.linalg.norm(CAMERA - cloud.points, axis=1)[:, None]
+    assert np.sum(cloud.normals * rays, axis=1).min() > 0.99
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda p: p[:5], "has 5 finite points"),
+        (lambda p: np.full((50, 3), np.nan), "has 0 finite points"),
+        (lambda p: np.tile(p[:1], (50, 1)), "has 1 different points"),
+        (lambda p: 1000.0 * p, "--unit mm"),
+        (lambda p: 0.01 * p, "give its --unit"),
+        (lambda p: 10.0 * p, "too much for a hand"),
+        (lambda p: np.linspace(0.0, 0.1, 200)[:, None] * [1.0, 0.5, 0.0], "lie on a line"),
+        (lambda p: np.vstack([p, p[:900] + np.array([0.3, 0.0, 0.0])]), "two objects"),
+    ],
+)
+def test_what_no_shape_can_be_learnt_from_is_said_in_one_line(mug, change, said):
+    with pytest.raises(InputError, match=said) as error:
+        cleaned(change(mug))
+    assert "\n" not in str(error.value)
+
+
+def test_millions_of_points_are_read_in_part():
+    many = surface_points(shipped_object("mug"), 1_000_000, np.random.default_rng(4))[0]
+    cloud = cleaned(many)
+    assert any("each 17th was taken" in note for note in cloud.notes)
+    assert len(cloud.points) <= 2500

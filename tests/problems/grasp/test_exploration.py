@@ -1,0 +1,146 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import surehold as sh
+from surehold.errors import InputError
+from surehold.grasping.object.shipped import shipped_object
+from surehold.grasping.poses import Pose
+from surehold.grasping.simulator import Simulator
+from surehold.problems.grasp.exploration import Exploration, belief_of_box
+from surehold.problems.grasp.problem import GraspProblem
+from surehold.problems.grasp.shape_loss import shape_loss
+from surehold.problems.grasp.touch import contacts_of_file, touch_trial
+
+NOISE = sh.InputNoise.unit(0.03)
+BOTTLE = shipped_object("bottle")
+PROBLEM = GraspProblem(BOTTLE)
+
+
+def a_grasp():
+    grid = np.stack(np.meshgrid([0.2, 0.35, 0.5, 0.65], [0.3, 0.5, 0.7]), axis=-1).reshape(-1, 2)
+    return next(x for x in PROBLEM.box.from_unit(grid) if len(PROBLEM.grasp(x).touching) > 3)
+
+
+@pytest.fixture(scope="module")
+def explored():
+    run = Exploration(PROBLEM, belief_of_box(BOTTLE, cell=0.006), NOISE, shapes=2, seed=1)
+    touches = []
+    for _ in range(4):
+        x = run.ask()
+        touch = touch_trial(PROBLEM.simulator, PROBLEM.pose(x), PROBLEM.posture(x))
+        run.tell(x, touch.grasp.quality, touch.observations)
+        touches.append(touch)
+    return run, touches
+
+
+def test_what_is_felt_lies_on_the_true_surface_and_what_is_swept_is_free(explored):
+    run, touches = explored
+    field = PROBLEM.simulator.field
+    felt = sum((t.observations for t in touches[1:]), start=touches[0].observations)
+    assert len(felt.points) > 8
+    assert np.abs(field.distance(felt.points)).max() < 2e-4
+    assert np.sum(field.gradient(felt.points) * felt.slopes, axis=1).min() > 0.95
+    assert np.all(field.distance(felt.free[:, :3]) > felt.free[:, 3] - 1e-4)
+    assert len(run.X) == len(run.y) == 4
+
+
+def test_the_surface_moves_to_what_was_felt(explored):
+    run, touches = explored
+    before = belief_of_box(BOTTLE).surface
+    points = np.vstack([t.observations.points for t in touches])
+    assert np.abs(run.belief.surface.value(points)).mean() < 0.0015
+    assert np.abs(run.belief.surface.value(points)).mean() < 0.3 * np.abs(before.value(points)).mean()
+    assert np.all(run.belief.surface.deviation(points) < 0.3 * before.std)
+
+
+def test_the_next_trial_follows_from_what_was_told(explored):
+    run, touches = explored
+    again = Exploration(PROBLEM, belief_of_box(BOTTLE, cell=0.006), NOISE, shapes=2, seed=1)
+    for x, touch in zip(run.X, touches, strict=True):
+        again.tell(x, touch.grasp.quality, touch.observations)
+    assert np.array_equal(again.ask(), run.ask())
+    answer = run.recommend()
+    assert PROBLEM.box.contains(answer.x)
+    assert np.isfinite(answer.mean)
+
+
+def test_exploring_for_the_shape_goes_where_it_is_not_known(explored):
+    run, _ = explored
+    curious = Exploration(PROBLEM, run.belief, NOISE, "shape", shapes=0, seed=1)
+    imagined = curious._imagined()
+    candidates = curious._candidates()
+    chosen = curious._unknown(imagined, curious.ask())
+    assert chosen == max(curious._unknown(imagined, x) for x in candidates)
+
+
+def test_a_probe_ends_at_the_first_contact():
+    x = a_grasp()
+    pose, s1 = PROBLEM.pose(x), PROBLEM.posture(x)
+    whole, probe = (touch_trial(PROBLEM.simulator, pose, s1, only).observations for only in (False, True))
+    assert 0 < len(probe.points) < len(whole.points)
+
+
+def test_a_hand_that_meets_the_object_on_its_way_feels_it():
+    x = PROBLEM.box.from_unit(np.full(2, 0.5))
+    pose = PROBLEM.pose(x)
+    deep = Pose(tuple(np.asarray(pose.position) + 0.03 * pose.rotation[:, 2]), pose.quaternion)
+    touch = touch_trial(PROBLEM.simulator, deep, PROBLEM.posture(x))
+    assert touch.grasp.status == "initial collision"
+    assert len(touch.observations.points) > 0
+    assert np.abs(PROBLEM.simulator.field.distance(touch.observations.points)).max() < 2e-4
+
+
+def test_value_over_draws_is_the_mean_over_simulators():
+    wider = replace(BOTTLE, friction=0.9)
+    unknown = PROBLEM.on(replace(BOTTLE, draws=(BOTTLE, wider)))
+    x = a_grasp()
+    expected = [Simulator(obj=obj).grasp(PROBLEM.pose(x), PROBLEM.posture(x)).quality for obj in (BOTTLE, wider)]
+    assert expected[0] != expected[1]
+    assert unknown.over_shapes(x).tolist() == expected
+    assert unknown(x) == pytest.approx(np.mean(expected), abs=1e-15)
+    assert PROBLEM(x) == expected[0]
+
+
+def test_losses_sum_to_what_is_lost():
+    wider = replace(BOTTLE, friction=0.9)
+    unknown = PROBLEM.on(replace(BOTTLE, draws=(BOTTLE, wider)))
+    x = a_grasp()
+    loss = shape_loss(unknown, x, NOISE, n=5)
+    assert loss.nominal - loss.pose - loss.shape == pytest.approx(loss.robust, abs=1e-12)
+    known = PROBLEM.on(replace(BOTTLE, draws=(BOTTLE, BOTTLE)))
+    assert shape_loss(known, x, NOISE, n=5).shape == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_unknown_goal():
+    with pytest.raises(InputError, match="goal 'shap' is unknown; did you mean 'shape'"):
+        Exploration(PROBLEM, belief_of_box(BOTTLE), NOISE, "shap")
+
+
+def test_contacts_of_a_file(tmp_path):
+    path = tmp_path / "contacts.json"
+    path.write_text(json.dumps({"contacts": [{"point": [0.0, 0.026, 0.05], "normal": [0.0, 1.0, 0.0]}]}))
+    told = contacts_of_file(path)
+    assert told.points.tolist() == [[0.0, 0.026, 0.05]]
+    assert told.slopes.tolist() == [[0.0, 1.0, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "are not read"),
+        ('{"touches": []}', "are not read"),
+        ('{"contacts": []}', "hold 0 touches"),
+        ('{"contacts": [{"point": [0, 0, 0]}]}', "are not read"),
+        ('{"contacts": [{"point": [0, 0, 0], "normal": [0, 0, 3]}]}', "contact 0"),
+        ('{"contacts": [{"point": [0, 0, NaN], "normal": [0, 0, 1]}]}', "contact 0"),
+    ],
+)
+def test_contacts_that_are_none(tmp_path, text, said):
+    path = tmp_path / "contacts.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said) as error:
+        contacts_of_file(path)
+    assert "\n" not in str(error.value)
