@@ -19,7 +19,7 @@ PACKAGES: Final = {
     "surehold.studies": "Runs that survive: storage, resume, workers, robots in any language.",
 }
 #: modules without a stub whose `__all__` is public
-MODULES: Final = {"surehold.sklearn": "Estimators for scikit-learn."}
+MODULES: Final = {"surehold.sklearn": "Estimators for scikit-learn.", "surehold.gest": "A generator of gest-api."}
 
 
 def public_names(package: str) -> list[str]:

@@ -38,6 +38,7 @@ DOORS = {
     "report": "import surehold.reports",
     "campaign": "import surehold.campaigns",
     "sklearn": "import surehold.sklearn",
+    "gest": "import surehold.gest",
 }
 
 
