@@ -21,6 +21,16 @@ PACKAGES: Final = {
 #: modules without a stub whose `__all__` is public
 MODULES: Final = {"surehold.sklearn": "Estimators for scikit-learn.", "surehold.gest": "A generator of gest-api."}
 
+BENCHMARKS: Final = """# Benchmarks
+
+Made from the tables in `results/`, which hold every run with its trace, settings, versions and seed. All runs were made
+on two cores of a virtual x86-64 machine, one process a run and one thread a process; times are CPU seconds. A number
+without enough runs behind it says how many it has: 5 of 20.
+
+How long an ask takes with n trials, how a campaign scales with workers, calibration, closing and quality of grasps:
+`make bench`, or `python -m benchmarks.NAME` for one.
+"""
+
 
 def public_names(package: str) -> list[str]:
     """Return the public names of a package in the order of its stub, subpackages left out."""
@@ -43,6 +53,26 @@ def write(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     for package, about in {**PACKAGES, **MODULES}.items():
         _write(folder / f"{package}.rst", _reference(package, about))
+    _write(folder / "benchmarks.md", _benchmarks())
+
+
+def _benchmarks() -> str:
+    """Return the tables of the campaigns that go past the thesis."""
+    from surehold.campaigns.report import read_campaigns
+    from surehold.campaigns.sections import campaign_section
+    from surehold.campaigns.thesis import exhibit_of
+    from surehold.reports.campaign_page import markdown_table
+
+    campaigns = read_campaigns(sorted({path.parent for path in ROOT.glob("results/*/table*.jsonl*")}))
+    parts = [BENCHMARKS]
+    for plan, records in campaigns.items():
+        if exhibit_of(plan) is not None:
+            continue
+        section = campaign_section(records)
+        versions = sorted({tuple(row["versions"].items()) for row in records.done.values()})[-1]
+        parts += [f"## {section.title}", section.text, f"Plan `{plan}`.", markdown_table(section.tables[0])]
+        parts.append("Made with " + ", ".join(f"{name} {version}" for name, version in versions) + ".")
+    return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def _reference(package: str, about: str) -> str:

@@ -26,4 +26,3 @@ for answer, color, name in ((plain, "C1", "plain"), (robust, "C0", "robust")):
 axes.set(xlabel="x", ylabel="value")
 axes.legend()
 figure.tight_layout()
-plt.show()
