@@ -86,3 +86,19 @@ def test_the_picture_is_of_the_program_as_it_is(tmp_path):
             assert now[field] == pytest.approx(then[field], abs=tolerance), (
                 "run `make pictures` and look at docs/mug.png"
             )
+
+
+def test_the_version_is_the_same_everywhere():
+    for path, pattern in (
+        ("pyproject.toml", r'^version = "(.+)"$'),
+        ("CITATION.cff", r"^version: (.+)$"),
+        ("docs/about/cite.md", r"version = \{(.+)\}"),
+        ("packaging/conda/recipe.yaml", r'version: "(.+)"'),
+        ("examples/ros2/surehold_ros/setup.py", r'version="(.+)"'),
+        ("examples/ros2/surehold_ros/package.xml", r"<version>(.+)</version>"),
+        ("examples/ros2/surehold_interfaces/package.xml", r"<version>(.+)</version>"),
+        ("CHANGELOG.md", r"^## ([\d.]+) "),
+    ):
+        found = re.search(pattern, (ROOT / path).read_text(encoding="utf-8"), re.MULTILINE)
+        assert found is not None, path
+        assert found[1] == sh.__version__, f"{path} has version {found[1]}"
