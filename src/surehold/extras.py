@@ -18,6 +18,7 @@ EXTRAS: Final[dict[str, tuple[str, ...]]] = {
     "mesh": ("libigl",),
     "sklearn": ("scikit-learn",),
     "gest": ("gest-api",),
+    "mcp": ("mcp",),
     "dask": ("dask",),
 }
 #: module of a distribution, where the names differ
