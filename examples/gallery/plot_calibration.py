@@ -2,8 +2,8 @@
 Do the predictions hold?
 ========================
 
-Of a well calibrated model half the values lie below the median, and nine tenths below the 90 % quantile. Points above
-the diagonal: the model is too careful; below: too sure.
+Of a well calibrated model half the values lie below the median, and nine tenths below the 90 % quantile. A curve that
+is steeper than the diagonal in the middle is of a model that is too careful, a flatter one of a model that is too sure.
 """
 
 import matplotlib.pyplot as plt

@@ -16,7 +16,7 @@ def ridges(x):
     a, b = x[..., 0], x[..., 1]
     falling = 1.1 * np.exp(-(((a + b - 0.6) / 0.08) ** 2) - ((a - b) / 0.9) ** 2)
     rising = np.exp(-(((a - b - 0.4) / 0.08) ** 2) - ((a + b - 1.2) / 0.9) ** 2)
-    return falling + rising
+    return np.maximum(falling, rising)
 
 
 box = sh.Box({"a": (0.0, 1.0), "b": (0.0, 1.0)})

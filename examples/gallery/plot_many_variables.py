@@ -3,6 +3,7 @@ Many variables
 ==============
 
 In eight variables and sixty trials most of the box stays unknown. The trust region searches near the best trial.
+On a smooth bowl both ways find it.
 """
 
 import matplotlib.pyplot as plt

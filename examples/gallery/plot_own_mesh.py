@@ -18,7 +18,7 @@ from surehold.reports.gather import drawn_scene
 from surehold.reports.still import still_picture
 
 solid = trimesh.boolean.difference(
-    [trimesh.creation.box((0.06, 0.06, 0.12)), trimesh.creation.cylinder(radius=0.02, height=0.2)]
+    [trimesh.creation.box((0.04, 0.04, 0.07)), trimesh.creation.cylinder(radius=0.012, height=0.2)]
 )
 with TemporaryDirectory() as folder:
     solid.export(Path(folder, "part.stl"))

@@ -31,11 +31,15 @@ def commands(text, language):
     return [shlex.split(line.removeprefix("$ "), comments=True) for line in lines]
 
 
+#: what a page needs that is not in every environment of developers
+NEEDED = {"docs/how-to/xopt.md": "gest_api"}
 RUNNABLE = [name for name, text in TEXTS.items() if ">>>" in text or "```console" in text]
 
 
 @pytest.mark.parametrize("name", RUNNABLE)
 def test_a_page_runs(name, tmp_path, monkeypatch):
+    if name in NEEDED:
+        pytest.importorskip(NEEDED[name])
     monkeypatch.chdir(tmp_path)
     results = doctest.testfile(str(ROOT / name), module_relative=False, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert results.failed == 0, (
@@ -105,7 +109,7 @@ def test_yaml_is_a_plan_or_a_hand():
 
 def test_every_block_is_of_a_kind_that_is_checked():
     for name, text in TEXTS.items():
-        opened = re.findall(r"^```(\S*)$", text, re.MULTILINE)[::2]
+        opened = re.findall(r"^```(.*)$", text, re.MULTILINE)[::2]
         wrong = {kind for kind in opened if kind not in LANGUAGES and not kind.startswith("{")}
         assert not wrong, f"{name} has blocks of {wrong}"
         for block in blocks(text, "python"):
