@@ -217,6 +217,15 @@ THESIS_LOCAL_SCALE: Final = 0.05
 #: jumps to a random one, which cost it whole runs. Never measured against other numbers.
 THESIS_REPEATS: Final = 2
 
+# --- the record of trials ---------------------------------------------------------------------------------------------
+
+#: A rig rounds to its resolution: what is told within so many box widths, in every variable, of a pending trial is it.
+#: Never measured.
+ROUNDED: Final = 0.01
+#: Ranges of all other values by which an outlier lies below them. Wild readings of -30 and -100 among values of [0, 1]
+#: spoil no run of 20 with it; a smaller one would take true low values for outliers. Never measured otherwise.
+OUTLIER_DISTANCE: Final = 5.0
+
 # --- constraints ------------------------------------------------------------------------------------------------------
 
 #: Points of a Sobol sequence that are tested for the first allowed inputs: at most so many where all constraints are

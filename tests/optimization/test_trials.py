@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
 
+from surehold.defaults import ROUNDED
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
-from surehold.optimization.trials import ROUNDED, AskedTrial
+from surehold.optimization.trials import AskedTrial
 
 BOX = Box({"dx": (-0.05, 0.05), "dy": (-0.03, 0.03)})
 NOISE = InputNoise({"dx": 0.003, "dy": 0.003})

@@ -1,7 +1,9 @@
 """A whole run: ask, try, tell, until the budget is spent."""
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,6 +18,7 @@ from surehold.optimization.progress import progress_bar
 from surehold.optimization.recommendation import Recommendation
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from pandas import DataFrame
 
 __all__ = ["Result", "Trial", "maximize", "minimize"]
@@ -114,6 +117,23 @@ class Result:
             table[name if name not in table else f"trial {name}"] = values
         table.index.name = "trial"
         return table
+
+    def plot(self, function: Callable[[Any], float] | None = None) -> "Figure":
+        """Return one picture of the run, a figure of matplotlib; see `surehold.reports.plots.plot`."""
+        from surehold.reports.plots import plot
+
+        return plot(self, function)
+
+    def report(
+        self,
+        folder: str | os.PathLike[str],
+        function: Callable[[Any], float] | None = None,
+        title: str = "Optimization",
+    ) -> Path:
+        """Write the run as a page with its data and figures; see `surehold.reports.plots.write_report`."""
+        from surehold.reports.plots import write_report
+
+        return write_report(self, Path(folder), function, title=title)
 
     def __repr__(self) -> str:
         failed = int(np.isnan(self.y).sum())

@@ -7,7 +7,7 @@ Legend
 
 import os
 from collections.abc import Mapping
-from typing import Any, Final, Literal, overload
+from typing import TYPE_CHECKING, Any, Final, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,6 +36,9 @@ from surehold.optimization.strategy.trust_region import TrustRegion
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate, mixture
 from surehold.optimization.trials import AskedTrial, Trials, initial_inputs, number_of, same
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Optimizer"]
 
@@ -588,6 +591,12 @@ class Optimizer:
     def posterior(self) -> Posterior:
         """The surrogate conditioned on the trials told so far; inputs in the unit cube."""
         return self._model.posterior(self._trials)
+
+    def plot_slice(self, x: Any = None) -> "Figure":
+        """Return the model along each coordinate, a figure of matplotlib; see `surehold.reports.slices.plot_slice`."""
+        from surehold.reports.slices import plot_slice
+
+        return plot_slice(self, x)
 
     def __repr__(self) -> str:
         parts = [f"{len(self._trials)} trials", f"{len(self._trials.pending)} pending"]

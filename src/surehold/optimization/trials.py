@@ -13,16 +13,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.defaults import OUTLIER_DISTANCE, ROUNDED
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit, checked_outputs
 from surehold.optimization.points import numbers_of
 
-__all__ = ["OUTLIER_DISTANCE", "ROUNDED", "AskedTrial", "Trials", "initial_inputs", "number_of", "same"]
+__all__ = ["AskedTrial", "Trials", "initial_inputs", "number_of", "same"]
 
 _SEPARATION: Final = 1e-6  # points closer than this in every coordinate of the unit cube are the same trial
-#: A rig rounds to its resolution: what is told within so many box widths, in every variable, of a pending trial is it.
-ROUNDED: Final = 0.01
 # A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
 # it stay finite.
 _FARTHEST: Final = 1e6
@@ -38,10 +37,6 @@ class AskedTrial:
     """(d,), in the box's units"""
     parameters: dict[str, Any] = field(default_factory=dict)
     """the same by name"""
-
-
-#: Ranges of all other values by which an outlier lies below them.
-OUTLIER_DISTANCE: Final = 5.0
 
 
 def same(u: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:

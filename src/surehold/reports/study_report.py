@@ -28,7 +28,9 @@ def study_report(study: RobotStudy) -> RunReport:
     reason = study.paused or study.stopped()
     if reason:
         notes.append(f"The study is {'paused' if study.paused else 'stopped'}: {reason}.")
-    notes.append("Trials are counted from 1 here, in the order of their ids, which begin at 0.")
+    ids = [trial.number for trial in study.trials() if trial.state.is_finished()]
+    if ids != list(range(len(ids))):
+        notes.append("Trials are numbered from 0 in the order of their ids, of which some gave nothing to show.")
     rule = study.stop_rule
     rows = [space.decode(x) for x in result.X]
     names = [name for name in space.distributions if name not in box.names]

@@ -56,7 +56,7 @@ class Within:
         total = logsumexp(logs, axis=0) - np.log(len(logs))
         if not gradient:
             return total, np.zeros((0, d))
-        share = np.exp(logs - logsumexp(logs, axis=0))[..., None]  # (m, q, 1)
+        share = np.exp(logs - np.asarray(logsumexp(logs, axis=0)))[..., None]  # (m, q, 1)
         mean_slope, variance_slope = moments.mean_gradient, moments.variance_gradient
         if mean_slope is None or variance_slope is None:
             raise ValueError("moments were asked for without gradients")

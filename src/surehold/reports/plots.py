@@ -1,0 +1,87 @@
+"""Pictures and the page of a result, for those who work in Python."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from surehold.extras import require
+from surehold.optimization.maximization import Result
+from surehold.problems.function import Function
+from surehold.problems.perturbation import robust_score
+from surehold.reports import figures, files, gather
+from surehold.reports.run_report import Candidate, RunReport
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["plot", "result_report", "write_report"]
+
+_REQUERIES: Final = 100
+
+
+def plot(result: Result, function: Callable[[Any], float] | None = None) -> "Figure":
+    """Return one picture of a run: the model, its average over the input noise, and what happens when the input is off.
+
+    Parameters
+    ----------
+    function
+        What was optimized, to be queried 100 times around the best observed and around the recommended input. By
+        default the model's expectation stands for it, and there are no histograms.
+
+    Raises
+    ------
+    MissingExtra
+        If matplotlib is not installed.
+    """
+    require("report", "plot")
+    return figures.overview(result_report(result, function))
+
+
+def write_report(
+    result: Result, folder: str | Path, function: Callable[[Any], float] | None = None, *, title: str = "Optimization"
+) -> Path:
+    """Write report.html, result.json and the figures of a run into a folder, and return the path of the page.
+
+    `function` as in `plot`. Raises InputError if the folder cannot be written, MissingExtra without matplotlib.
+    """
+    require("report", "write_report")
+    return files.write_run(replace(result_report(result, function), title=title), folder)
+
+
+def result_report(result: Result, function: Callable[[Any], float] | None = None) -> RunReport:
+    """Return the report of a result, as plain data; see `plot`."""
+    optimizer = result.optimizer
+    box, noise = optimizer.box, optimizer.input_noise
+    candidates = []
+    for label, index in gather.answers(result).items():
+        score = None
+        if function is not None and noise is not None:
+            problem = Function(function if box.plain else lambda x: function(box.as_dict(x)), box)
+            score = robust_score(problem, result.X[index], noise, _REQUERIES, optimizer.seed)
+        found = gather.candidate(result, label, index, score)
+        candidates.append(found if score is not None or noise is None else _expected(result, found))
+    plain = [box.as_dict(x) for x in result.X]
+    texts = [variable.name for variable in box.variables if variable.name not in box.names]
+    units = {v.name: "log" for v in box.variables if v.name in box.names and getattr(v, "log", False)}
+    return gather.report_of(
+        result,
+        candidates,
+        title="Optimization",
+        settings={"direction": optimizer.direction, "trials": len(result.y)},
+        noise=noise,
+        units=units,
+        choices={name: tuple(str(row[name]) for row in plain) for name in texts},
+        hidden=[name for name in box.names if name not in [variable.name for variable in box.variables]],
+    )
+
+
+def _expected(result: Result, candidate: Candidate) -> Candidate:
+    """Return a candidate with what the model expects of it."""
+    best = result.recommendation
+    if candidate.label == "recommended":
+        return replace(
+            candidate, predicted_mean=best.mean, predicted_std=best.std, predicted_error=best.expectation.std
+        )
+    mean, std = result.optimizer.predict(candidate.x[None, :], under_noise=True)
+    return replace(candidate, predicted_mean=float(mean[0]), predicted_error=float(std[0]))

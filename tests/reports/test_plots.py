@@ -1,0 +1,78 @@
+"""Pictures of a result made from Python."""
+
+import json
+
+import numpy as np
+import pytest
+
+import surehold as sh
+from surehold.errors import InputError
+from surehold.reports.plots import result_report
+
+BOX = sh.Box({"force": (0.1, 10.0, "log"), "grip": ["pinch", "power"]})
+
+
+def needle(x):
+    return float(np.exp(-0.5 * ((x[0] - 0.3) / 0.15) ** 2) + 0.8 * np.exp(-0.5 * ((x[0] - 0.8) / 0.012) ** 2))
+
+
+@pytest.fixture(scope="module")
+def result():
+    box = sh.Box({"x": (0.0, 1.0)})
+    return sh.maximize(needle, box, 20, n_initial=8, seed=0, input_noise=sh.InputNoise.unit(0.05))
+
+
+def labels(figure):
+    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+
+
+def test_a_picture_of_the_model_and_of_the_re_queries(result, tmp_path):
+    figure = result.plot(needle)
+    figure.savefig(tmp_path / "run.png")
+    titles = [axes.get_title(loc="left") for part in figure.subfigs for axes in part.axes]
+    assert any("100 re-queries" in title for title in titles)
+    (line,) = [
+        axes for part in figure.subfigs for axes in part.axes if axes.get_title(loc="left") == "Model and trials"
+    ]
+    mean = line.lines[0]
+    x = float(mean.get_xdata()[100])
+    assert mean.get_ydata()[100] == pytest.approx(result.optimizer.predict([[x]])[0][0], rel=1e-9)
+
+
+def test_without_the_function_the_model_stands_for_it(result):
+    report = result_report(result)
+    assert report.recommended.values.size == 0
+    assert report.recommended.predicted_mean == result.recommendation.mean
+    assert result_report(result, needle).recommended.values.size == 100
+
+
+def test_the_page_is_written_from_python(result, tmp_path):
+    path = result.report(tmp_path / "page", needle, title="The needle")
+    assert "The needle" in path.read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "page" / "result.json").read_text())["trials"]["y"] == result.y.tolist()
+
+
+def test_slices_go_through_the_point(result):
+    figure = result.optimizer.plot_slice([0.5])
+    (axes,) = figure.axes
+    assert {"averaged over the input noise", "the point", "trials, projected"} <= set(labels(figure))
+    (point,) = [line for line in axes.lines if line.get_label() == "the point"]
+    assert point.get_xdata()[0] == 0.5
+    assert result.optimizer.plot_slice().axes[0].lines[-1].get_xdata()[0] == result.recommendation.x[0]
+    with pytest.raises(InputError, match="one point"):
+        result.optimizer.plot_slice([2.0])
+
+
+def test_boxes_of_many_kinds_are_drawn(tmp_path):
+    mixed = sh.minimize(
+        lambda p: abs(np.log(p["force"])) + (p["grip"] == "pinch"),
+        BOX,
+        12,
+        seed=0,
+        input_noise=sh.InputNoise({"force": 0.05}),
+    )
+    report = result_report(mixed, lambda p: abs(np.log(p["force"])) + (p["grip"] == "pinch"))
+    assert report.choices["grip"][report.recommended.trial] == "power"
+    assert report.recommended.mean < 0.2
+    assert len(mixed.optimizer.plot_slice({"force": 1.0, "grip": "power"}).axes) == 3
+    assert "force [log]" in mixed.report(tmp_path / "mixed").read_text(encoding="utf-8")
