@@ -82,7 +82,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "show_signature": False,
     "remove_config_comments": True,
-    "min_reported_time": 1,
+    "write_computation_times": False,
     "plot_gallery": os.environ.get("SUREHOLD_GALLERY", "1") == "1",
 }
 
