@@ -2,8 +2,8 @@
 A grasp of the mug
 ==================
 
-The iCub's left hand closes on the mug. Along the fingers the quality rises to an edge where the thumb loses the wall:
-the place not to be.
+The iCub's left hand closes on the mug. Along the fingers the quality rises to an edge where the open
+hand runs into the mug: the place not to be.
 """
 
 import io
