@@ -32,7 +32,12 @@ extensions = [
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["generated/gallery/**/*.ipynb", "generated/gallery/**/*.py", "**/sg_execution_times.rst", "sg_execution_times.rst"]
+exclude_patterns = [
+    "generated/gallery/**/*.ipynb",
+    "generated/gallery/**/*.py",
+    "**/sg_execution_times.rst",
+    "sg_execution_times.rst",
+]
 suppress_warnings = ["ref.python"]  # a bare name such as "lower" is an attribute of several classes
 templates_path = ["_templates"]
 
