@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 LOWEST := .venv/lowest
 
-.PHONY: grasp test explore check lowest bench reproduction clean
+.PHONY: grasp test explore check lowest bench reproduction pictures docs clean
 
 grasp: .venv/.installed
 	$(BIN)/surehold grasp mug
@@ -33,6 +33,14 @@ bench: .venv/.developer
 reproduction: .venv/.installed
 	$(BIN)/python -m surehold.campaigns.reproduction --pack
 
+# The README's picture and the numbers beside it, from the program as it is.
+pictures: .venv/.developer
+	$(BIN)/python docs/pictures.py
+
+# The site in build/site; its gallery runs while it is built, warnings are errors, nothing is fetched.
+docs: .venv/.docs
+	$(BIN)/python -m sphinx -W --keep-going -b html docs build/site
+
 clean:
 	rm -rf .venv
 
@@ -48,3 +56,7 @@ clean:
 .venv/.developer: pyproject.toml | .venv/.created
 	$(BIN)/pip install --quiet --editable '.[dev]'
 	touch $@ .venv/.installed
+
+.venv/.docs: pyproject.toml | .venv/.created
+	$(BIN)/pip install --quiet --editable '.[docs]'
+	touch $@

@@ -1,6 +1,6 @@
 """The main public paths once, on the libraries that are installed: what a release must do with the oldest it allows.
 
-    python .ci/smoke.py [optimizer surrogates grasps campaigns studies]
+    python .ci/smoke.py [optimizer surrogates grasps campaigns studies doors]
 
 Works in a temporary folder, ends with 0 where everything did what it must, and names the first path that did not.
 """
@@ -89,6 +89,21 @@ def studies() -> None:
             assert json.load(answer)["state"] == "open"
 
 
+def doors() -> None:
+    from gest_api.vocs import VOCS
+
+    from surehold.gest import RobustGenerator
+    from surehold.studies import RobotStudy, SearchSpace, StudySettings
+    from surehold.studies.model_context import model_context_server
+
+    generator = RobustGenerator(VOCS(variables={"x": [0.0, 1.0]}, objectives={"f": "MINIMIZE"}), n_initial=3)
+    for point in generator.suggest(4):
+        generator.ingest([point | {"f": point["x"]}])
+    assert generator.recommend().n == 4
+    study = RobotStudy.create("door", StudySettings(SearchSpace(sh.Box({"x": (0.0, 1.0)})), None, {}, {}), "door.log")
+    assert model_context_server(study).name == "surehold study door"
+
+
 def surehold(line: str) -> None:
     """Run a command, which must end well."""
     code = run(line.split())
@@ -97,7 +112,7 @@ def surehold(line: str) -> None:
 
 def main() -> int:
     """Run all paths, each in a folder of its own."""
-    paths: tuple[Callable[[], None], ...] = (optimizer, surrogates, grasps, campaigns, studies)
+    paths: tuple[Callable[[], None], ...] = (optimizer, surrogates, grasps, campaigns, studies, doors)
     with tempfile.TemporaryDirectory() as folder:
         os.environ["SUREHOLD_CACHE"] = f"{folder}/cache"
         for path in (path for path in paths if not sys.argv[1:] or path.__name__ in sys.argv):

@@ -38,6 +38,7 @@ DOORS = {
     "report": "import surehold.reports",
     "campaign": "import surehold.campaigns",
     "sklearn": "import surehold.sklearn",
+    "gest": "import surehold.gest",
 }
 
 
@@ -85,6 +86,6 @@ def test_the_packages_of_an_extra_are_those_of_the_project_file():
 
 
 def test_all_is_all():
-    extras = set(PROJECT["optional-dependencies"]) - {"all", "dev", "peers"}
+    extras = set(PROJECT["optional-dependencies"]) - {"all", "dev", "docs", "peers"}
     assert extras == set(EXTRAS)
     assert PROJECT["optional-dependencies"]["all"] == [f"surehold[{','.join(sorted(extras))}]"]

@@ -17,12 +17,15 @@ EXTRAS: Final[dict[str, tuple[str, ...]]] = {
     "mujoco": ("mujoco",),
     "mesh": ("libigl",),
     "sklearn": ("scikit-learn",),
+    "gest": ("gest-api",),
+    "mcp": ("mcp",),
     "dask": ("dask",),
 }
 #: module of a distribution, where the names differ
 MODULES: Final[dict[str, str]] = {
     "PyYAML": "yaml",
     "dask": "distributed",
+    "gest-api": "gest_api",
     "libigl": "igl",
     "optuna-dashboard": "optuna_dashboard",
     "scikit-learn": "sklearn",

@@ -2,7 +2,7 @@ from setuptools import setup
 
 setup(
     name="surehold_ros",
-    version="0.1.0",
+    version="0.2.0",
     packages=["surehold_ros"],
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/surehold_ros"]),

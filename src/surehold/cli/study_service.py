@@ -1,4 +1,4 @@
-"""What runs beside a study: workers, the HTTP service, the dashboard, the report."""
+"""What runs beside a study: workers, the HTTP service, the dashboard, the report, a server for language models."""
 
 import os
 from collections.abc import Callable
@@ -15,7 +15,7 @@ __all__ = ["commands"]
 
 def commands() -> list[tuple[str, Callable[..., Any]]]:
     """Return the commands by name."""
-    return [("work", work), ("serve", serve), ("dashboard", dashboard), ("report", report)]
+    return [("work", work), ("serve", serve), ("dashboard", dashboard), ("report", report), ("mcp", mcp)]
 
 
 def work(
@@ -94,6 +94,13 @@ def serve(
         if not token:
             typer.echo(f"Callers send the header: Authorization: Bearer {secret}")
         server.run(application)
+
+
+def mcp(name: Name, storage: Storage = "") -> None:
+    """Answer a language model by the Model Context Protocol, on standard input and output."""
+    from surehold.studies.model_context import model_context_server
+
+    model_context_server(opened(name, storage)).run("stdio")
 
 
 def token_of(path: str) -> str:

@@ -1,0 +1,102 @@
+"""Pages that are made of what the program says of itself: its public names, its changelog, its results."""
+
+import ast
+import importlib
+import inspect
+from pathlib import Path
+from typing import Final
+
+import surehold
+
+SOURCE: Final = Path(surehold.__file__).parent
+ROOT: Final = Path(__file__).parents[1]
+
+#: package -> what its page is about
+PACKAGES: Final = {
+    "surehold": "Optimizer, search space, input noise, models, and whole runs.",
+    "surehold.problems": "What is maximized, and how an answer is scored under input noise.",
+    "surehold.grasping": "A hand closes on an object; no optimizer is known here.",
+    "surehold.studies": "Runs that survive: storage, resume, workers, robots in any language.",
+}
+#: modules without a stub whose `__all__` is public
+MODULES: Final = {"surehold.sklearn": "Estimators for scikit-learn.", "surehold.gest": "A generator of gest-api."}
+
+BENCHMARKS: Final = """# Benchmarks
+
+Made from the tables in `results/`, which hold every run with its trace, settings, versions and seed. All runs were made
+on two cores of a virtual x86-64 machine, one process a run and one thread a process; times are CPU seconds. A number
+without enough runs behind it says how many it has: 5 of 20.
+
+How long an ask takes with n trials, how a campaign scales with workers, calibration, closing and quality of grasps:
+`make bench`, or `python -m benchmarks.NAME` for one.
+"""
+
+
+def public_names(package: str) -> list[str]:
+    """Return the public names of a package in the order of its stub, subpackages left out."""
+    if package in MODULES:
+        return list(importlib.import_module(package).__all__)
+    stub = SOURCE.joinpath(*package.split(".")[1:], "__init__.pyi")
+    names = [
+        alias.asname or alias.name
+        for statement in ast.parse(stub.read_text(encoding="utf-8")).body
+        if isinstance(statement, ast.ImportFrom)
+        for alias in statement.names
+    ]
+    module = importlib.import_module(package)
+    top = () if package == "surehold" else public_names("surehold")  # documented there
+    return [name for name in names if name not in top and not inspect.ismodule(getattr(module, name))]
+
+
+def write(folder: Path) -> None:
+    """Write all generated pages."""
+    folder.mkdir(exist_ok=True)
+    for package, about in {**PACKAGES, **MODULES}.items():
+        _write(folder / f"{package}.rst", _reference(package, about))
+    _write(folder / "benchmarks.md", _benchmarks())
+
+
+def _benchmarks() -> str:
+    """Return the tables of the campaigns that go past the thesis."""
+    from surehold.campaigns.report import read_campaigns
+    from surehold.campaigns.sections import campaign_section
+    from surehold.campaigns.thesis import exhibit_of
+    from surehold.reports.campaign_page import markdown_table
+
+    campaigns = read_campaigns(sorted({path.parent for path in ROOT.glob("results/*/table*.jsonl*")}))
+    parts = [BENCHMARKS]
+    for plan, records in campaigns.items():
+        if exhibit_of(plan) is not None:
+            continue
+        section = campaign_section(records)
+        versions = sorted({tuple(row["versions"].items()) for row in records.done.values()})[-1]
+        parts += [f"## {section.title}", section.text, f"Plan `{plan}`.", markdown_table(section.tables[0])]
+        parts.append("Made with " + ", ".join(f"{name} {version}" for name, version in versions) + ".")
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _reference(package: str, about: str) -> str:
+    module = importlib.import_module(package)
+    groups: dict[str, list[str]] = {"Classes": [], "Functions": [], "Constants": []}
+    for name in public_names(package):
+        value = getattr(module, name)
+        kind = "Classes" if inspect.isclass(value) else "Functions" if callable(value) else "Constants"
+        groups[kind].append(name)
+    parts = [package, "=" * len(package), "", about, "", f".. currentmodule:: {package}", ""]
+    for title, names in groups.items():
+        if names and title == "Constants":
+            parts += [title, "-" * len(title), ""]
+            for name in names:
+                value = getattr(module, name)
+                shown = ", ".join(f"``{item}``" for item in value)
+                parts += [f"``{name}``", f"    {shown}", ""]
+        elif names:
+            parts += [title, "-" * len(title), "", ".. autosummary::", "    :toctree: names", "    :nosignatures:", ""]
+            parts += [*(f"    {name}" for name in names), ""]
+    return "\n".join(parts)
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a page where it has changed, so that Sphinx reads it anew only then."""
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")

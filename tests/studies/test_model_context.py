@@ -1,0 +1,78 @@
+"""The tools of a study under the real client of the protocol: in one process, and over the standard streams."""
+
+import asyncio
+import json
+import os
+import sys
+
+import pytest
+
+import surehold as sh
+from surehold.studies import RobotStudy, SearchSpace, StudySettings
+
+pytest.importorskip("mcp")
+
+from mcp.client import Client
+from mcp.client.stdio import StdioServerParameters, stdio_client
+
+from surehold.studies.model_context import model_context_server
+
+NOISE = sh.InputNoise.unit(0.03)
+RKHS = sh.problems.RKHS()
+
+
+@pytest.fixture
+def study(tmp_path):
+    settings = StudySettings(SearchSpace(RKHS.box), NOISE, {}, {"seed": 0, "n_initial": 8})
+    opened = RobotStudy.create("hill", settings, str(tmp_path / "journal.log"))
+    yield opened
+    opened.close()
+
+
+def test_a_loop_finds_what_holds(study):
+    async def loop():
+        async with Client(model_context_server(study)) as client:
+            for _ in range(25):
+                asked = (await client.call_tool("ask", {"worker": "me"})).structured_content
+                value = float(RKHS(list(asked["parameters"].values())))
+                await client.call_tool("tell", {"id": asked["id"], "value": value})
+            return (await client.call_tool("recommend", {})).structured_content
+
+    answer = asyncio.run(loop())
+    x = list(answer["parameters"].values())
+    best = sh.problems.robust_optimum(RKHS, NOISE).x
+    held, most = (sh.problems.robust_score(RKHS, at, NOISE, n=500, seed=1).mean for at in (x, best))
+    assert held > 0.97 * most
+
+
+def test_refusals_are_errors_of_the_tool(study):
+    async def refused():
+        async with Client(model_context_server(study)) as client:
+            asked = (await client.call_tool("ask", {})).structured_content
+            await client.call_tool("tell", {"id": asked["id"], "value": 1.0})
+            again = await client.call_tool("tell", {"id": asked["id"], "value": 2.0})
+            unknown = await client.call_tool("tell", {"id": 99, "value": 2.0})
+            state = (await client.call_tool("status", {})).structured_content
+            return again, unknown, state
+
+    again, unknown, state = asyncio.run(refused())
+    assert again.is_error
+    assert unknown.is_error
+    assert "99" in unknown.content[0].text
+    assert state["complete"] == 1
+    assert state["best_value"] == 1.0
+
+
+def test_the_command_over_the_standard_streams(study):
+    command = ["-m", "surehold", "study", "mcp", "hill", "--storage", study.storage.shown]
+
+    async def asked():
+        server = StdioServerParameters(command=sys.executable, args=command, env=dict(os.environ))
+        async with Client(stdio_client(server)) as client:
+            tools = {tool.name for tool in (await client.list_tools()).tools}
+            return tools, await client.call_tool("ask", {})
+
+    tools, answer = asyncio.run(asked())
+    assert {"ask", "tell", "recommend", "next_trial", "add", "status", "trials"} == tools
+    assert json.loads(answer.content[0].text)["id"] == 0
+    assert len(study.trials()) == 1
