@@ -184,8 +184,8 @@ CURVATURE_STEP: Final = 0.05
 RELEARNT_DIVISOR: Final = 16
 SURPRISE: Final = 4.0
 #: Trials up to which a process takes all of them together: its cost grows with their cube. Beyond, hyperparameters are
-#: learnt from about so many of them. Time: python -m benchmarks.growth. Quality at the switch: three of four runs in 6 to
-#: 20 variables that switched at 100 lost precision, so it is late; never measured at this number.
+#: learnt from about so many of them. Time: python -m benchmarks.growth. Runs in 6 to 20 variables that switched at 100
+#: lost precision, so the switch is late; its effect on the result was never measured at this number.
 MANY: Final = 800
 MANY_LEARNT: Final = 200
 #: Trials that a query is then answered from: the nearest of all, of every eighth, of every 64th.

@@ -183,10 +183,10 @@ def grasp(
 def drawn(problem: Any, outcome: Any) -> Any:
     """Return the scene of a grasp; an object of unknown shape is colored by how uncertain its surface is."""
     from surehold.grasping.pictures.scene import grasp_scene
-    from surehold.reports.gather import grasp_scene as as_drawn
+    from surehold.reports.gather import drawn_scene
     from surehold.reports.uncertain_shape import shape_meshes
 
-    scene = as_drawn(grasp_scene(problem.simulator, outcome))
+    scene = drawn_scene(grasp_scene(problem.simulator, outcome))
     body = problem.object
     if not body.draws:
         return scene
