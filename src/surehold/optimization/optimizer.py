@@ -46,9 +46,10 @@ from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.strategy.trust_region import TrustRegion
 from surehold.optimization.success import check_combination, counted, described
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
+from surehold.optimization.surrogates.named import TELLABLE
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate, mixture
 from surehold.optimization.surrogates.success.model import SuccessProcess
-from surehold.optimization.trials import AskedTrial, Trials, initial_inputs, number_of, same
+from surehold.optimization.trials import AskedTrial, Trials, initial_inputs, number_of, same, told_noise
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -99,8 +100,9 @@ class Optimizer:
         Non-negative integer.
     noise
         Observation noise of "two_scales", "gp" and "tgp": "none" (what None, the default, stands for), its standard
-        deviation in the outputs' units, "inferred", or "heteroscedastic" (inferred, differing from place to place). A
-        surrogate object and a thesis preset have their own: there it must be None, not given.
+        deviation in the outputs' units, "inferred", "heteroscedastic" (inferred, differing from place to place), or
+        "told": each trial tells its own, `tell(x, y, noise=0.2)`. A surrogate object and a thesis preset have their
+        own: there it must be None, not given.
     output_range
         (lowest, highest) value to expect, if known; None (default) where it is not, and beside a surrogate object or a
         thesis preset.
@@ -180,7 +182,7 @@ class Optimizer:
         fixed: Mapping[str, Any] | None = None,
         design: str = "latin_hypercube",
         seed: int = 0,
-        noise: float | NoiseName | None = None,
+        noise: float | NoiseName | Literal["told"] | None = None,
         output_range: tuple[float, float] | None = None,
         quadrature: str | None = None,
         k: float = 1.0,
@@ -222,11 +224,14 @@ class Optimizer:
         if output_range is not None and direction == "minimize":
             output_range = (-output_range[1], -output_range[0])
         thesis = None if preset is None else thesis_preset(preset)
+        self._noise_told: Final = noise == "told"
+        if noise == "told" and (preset is not None or outcome == "success" or surrogate not in (None, *TELLABLE)):
+            raise InputError(f"noise='told' needs one of the surrogates {', '.join(TELLABLE)}, and no preset.")
         model = chosen_surrogate(
             SuccessProcess() if outcome == "success" else surrogate,
             preset=preset,
             thesis=thesis,
-            noise=noise,
+            noise=None if noise == "told" else noise,
             output_range=output_range,
             box=box,
             input_noise=input_noise,
@@ -245,7 +250,7 @@ class Optimizer:
             k=k,
             border=border,
             kappa=kappa,
-            noisy=getattr(model, "noisy", False) or noise_while_exploring,
+            noisy=getattr(model, "noisy", False) or noise_while_exploring or self._noise_told,
             trust_region=TrustRegion(self.n_initial) if trust_region else None,
             thesis=thesis,
             allowed=None if region is None else region.contains,
@@ -264,6 +269,7 @@ class Optimizer:
             lattice=self._lattice,
             continues_chains=self._strategy.continues_chains,
             seed=self.seed,
+            told=self._noise_told,
         )
         if conditions not in ("commanded", "measured"):
             raise unknown_name("conditions", conditions, ("commanded", "measured"))
@@ -343,6 +349,7 @@ class Optimizer:
         success: bool | None = None,
         successes: int | None = None,
         of: int | None = None,
+        noise: float | None = None,
     ) -> None:
         """Record the outcome y of a trial at x, or that it gave nothing.
 
@@ -369,6 +376,9 @@ class Optimizer:
         success, successes, of
             In place of y where `outcome` is "success": True or False, or so many successes of so many executions. A
             failed trial counts as one that did not succeed.
+        noise
+            Standard deviation of the observation noise in y, where the optimizer was made with `noise="told"`; of the
+            mean of n readings, that of one by the root of n.
 
         Raises
         ------
@@ -381,7 +391,8 @@ class Optimizer:
         y = None if y is None else self._sign * number_of(y)
         if self._measured:
             reached = self._with_conditions(x, reached)
-        self._trials.tell(x, y, failed, reached, constraints, executions)
+        deviation = told_noise(noise, wanted=self._noise_told and not failed)
+        self._trials.tell(x, y, failed, reached, constraints, executions, deviation)
 
     def _with_conditions(self, x: Any, reached: Any) -> Any:
         """Return the reached input, of which only the uncontrolled variables must be said."""
@@ -412,13 +423,14 @@ class Optimizer:
         numbers: ArrayLike | None = None,
         outputs: ArrayLike | None = None,
         of: ArrayLike | None = None,
+        noise: ArrayLike | None = None,
     ) -> None:
         """Replace all trials by stored ones: X (t, d) with values y (t,), NaN for failed ones, and pending (p, d).
 
         `reached` (t, d) are the inputs that were truly reached, X where None. `numbers` (t + p,) are those of the
         trials, the pending ones last; 0, 1, 2, ... where None. `outputs` (t, o) are the further outputs in the order of
-        `constraints`, NaN where not measured. `of` (t,) are the executions of which
-        y is the share of successes, 1 each where None. What is asked next is what an optimizer asks that was
+        `constraints`, NaN where not measured. `of` (t,) are the executions of which y is the share of successes, 1 each
+        where None. `noise` (t,) are the standard deviations told. What is asked next is what an optimizer asks that was
         told these trials in this order.
 
         Raises
@@ -438,6 +450,7 @@ class Optimizer:
             numbers,
             outputs,
             of,
+            noise,
         )
         if not trials.equal(self._trials):
             self._model.forget()
@@ -637,7 +650,7 @@ class Optimizer:
                 int(self._trials.successful.sum()),
                 self._sign,
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
-                self._model.execution_noise,
+                self._model.execution_noise(self._trials),
                 "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
             )
             if self.outcome == "success":

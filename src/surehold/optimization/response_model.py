@@ -64,6 +64,8 @@ class ResponseModel:
         The input noise of the trials themselves; None if they reach what is commanded.
     continues_chains
         Whether a posterior goes on from the one before, so that it depends on all those before it.
+    told
+        Whether each trial tells the standard deviation of its observation noise.
     screened
         Whether failed trials and outliers count as the lowest other value; else all must have given a value.
     """
@@ -77,6 +79,7 @@ class ResponseModel:
         lattice: Lattice | None,
         continues_chains: bool,
         seed: int,
+        told: bool = False,
         screened: bool = True,
     ):
         self._surrogate: Final = surrogate
@@ -85,6 +88,7 @@ class ResponseModel:
         self._lattice: Final = lattice
         self._continues_chains: Final = continues_chains
         self._seed: Final = seed
+        self._told: Final = told
         self._screened: Final = screened
         self._cache: tuple[int, Posterior] | None = None
 
@@ -119,10 +123,13 @@ class ResponseModel:
         if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self._straying.unit_roots(self._box, trials.commanded).copy()
             roots[trials.reported] = 0.0
-            return condition_on_noisy_inputs(self._surrogate, trials.reached, values, roots, [self._seed, 1, 0])
+            told = trials.deviations if self._told else None
+            return condition_on_noisy_inputs(self._surrogate, trials.reached, values, roots, [self._seed, 1, 0], told)
         # One random stream for all, so that what some trials taught stays as it was when others follow.
         previous = self._cache[1] if self._continues_chains and self._cache is not None else None
         rng = np.random.default_rng([self._seed, 1, len(trials) if self._continues_chains else 0])
+        if self._told and isinstance(self._surrogate, NoisySurrogate):
+            return self._surrogate.condition(trials.reached, values, rng, previous, trials.deviations)
         return self._surrogate.condition(trials.reached, values, rng, previous)
 
     def diagnosis(self, trials: Trials) -> Diagnosis | None:
@@ -132,11 +139,13 @@ class ResponseModel:
             posterior = posterior.unrounded
         return diagnosis(posterior, trials.reached, trials.modelled)
 
-    @property
-    def execution_noise(self) -> float | None:
-        """Variance of the observation noise of one execution; None is what the surrogate says.
+    def execution_noise(self, trials: Trials) -> float | None:
+        """Return the variance of the observation noise of one execution; None is what the surrogate says.
 
         What the surrogate learns from trials that strayed contains the input noise, which executions have anyway.
+        Where each trial tells its own, the mean of theirs.
         """
+        if self._told:
+            return float(np.mean(trials.deviations[trials.successful] ** 2))
         known = getattr(self._surrogate, "known_noise", None) if self._straying is not None else None
         return None if known is None else known**2

@@ -43,15 +43,17 @@ def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], t
                 "reached": reached.tolist(),
                 "value": None if np.isnan(value) else float(value),
                 **({"executions": of} if of != 1 else {}),
+                **({"noise": deviation} if deviation else {}),
                 **({"outputs": [None if np.isnan(v) else v for v in outputs]} if outputs else {}),
             }
-            for number, commanded, reached, value, outputs, of in zip(
+            for number, commanded, reached, value, outputs, of, deviation in zip(
                 trials.numbers,
                 trials.commanded,
                 trials.reached,
                 trials.values,
                 trials.outputs.tolist(),
                 trials.executions.tolist(),
+                trials.deviations.tolist(),
                 strict=True,
             )
         ],
@@ -106,6 +108,7 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
             [trial["number"] for trial in [*told, *pending]],
             np.array([trial.get("outputs", []) for trial in told], dtype=np.float64).reshape(len(told), len(limits)),
             np.array([trial.get("executions", 1) for trial in told], dtype=np.intp),
+            np.array([trial.get("noise", 0.0) for trial in told], dtype=np.float64),
         )
         inputs = np.concatenate([trials.commanded, trials.pending])
         if not (np.isfinite(trials.reached).all() and np.all((inputs >= 0.0) & (inputs <= 1.0))):

@@ -19,7 +19,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit, checked_outputs
 from surehold.optimization.points import numbers_of
 
-__all__ = ["AskedTrial", "Trials", "initial_inputs", "number_of", "same"]
+__all__ = ["AskedTrial", "Trials", "initial_inputs", "number_of", "same", "told_noise"]
 
 _SEPARATION: Final = 1e-6  # points closer than this in every coordinate of the unit cube are the same trial
 # A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
@@ -56,6 +56,7 @@ class Trials:
         self.limits: Final = limits
         self._outputs: list[tuple[float, ...]] = []
         self._executions: list[int] = []
+        self._deviations: list[float] = []
         self._counted: Final = counted
         self._commanded: list[NDArray[np.float64]] = []
         self._reached: list[NDArray[np.float64]] = []
@@ -96,6 +97,11 @@ class Trials:
     def executions(self) -> NDArray[np.intp]:
         """Executions that each value is the mean of, (t,)."""
         return np.array(self._executions, dtype=np.intp)
+
+    @property
+    def deviations(self) -> NDArray[np.float64]:
+        """Standard deviations of the observation noise that were told with the values, (t,); 0 where none was."""
+        return np.array(self._deviations, dtype=np.float64)
 
     @property
     def numbers(self) -> NDArray[np.intp]:
@@ -180,6 +186,7 @@ class Trials:
         reached: Any,
         outputs: Mapping[str, float | None] | None = None,
         executions: int = 1,
+        deviation: float = 0.0,
     ) -> None:
         """Record the outcome of a trial; see `Optimizer.tell`. Nothing is recorded where an argument is bad."""
         if failed not in (False, True, "rig"):
@@ -197,6 +204,7 @@ class Trials:
             self._values.append(value)
             self._outputs.append(measured)
             self._executions.append(executions)
+            self._deviations.append(deviation)
             self._numbers.append(self.next_number if number is None else number)
         if number is not None:
             del self._pending[number]
@@ -210,11 +218,12 @@ class Trials:
         numbers: ArrayLike | None = None,
         outputs: ArrayLike | None = None,
         executions: ArrayLike | None = None,
+        deviations: ArrayLike | None = None,
     ) -> None:
         """Take over stored trials; see `Optimizer.restore`. Nothing is taken over where an argument is bad."""
         commanded, waiting = self._all("X", X, inside=True), self._all("pending", pending, inside=True)
         self.restore_cube(
-            commanded, y, self._all("reached", reached, inside=False), waiting, numbers, outputs, executions
+            commanded, y, self._all("reached", reached, inside=False), waiting, numbers, outputs, executions, deviations
         )
 
     def restore_cube(
@@ -226,6 +235,7 @@ class Trials:
         numbers: ArrayLike | None,
         outputs: ArrayLike | None = None,
         executions: ArrayLike | None = None,
+        deviations: ArrayLike | None = None,
     ) -> None:
         """Take over trials whose inputs are points of the unit cube, as they are."""
         d = self._box.dimension
@@ -252,13 +262,16 @@ class Trials:
         whole = np.abs(of * values - np.round(of * values)) < 1e-6
         if self._counted and not np.all((values >= 0.0) & (values <= 1.0) & whole):
             raise InputError("y holds a number that is no share of successes; give successes divided by executions.")
+        spread = np.zeros(len(inputs)) if deviations is None else np.asarray(deviations, dtype=np.float64)
+        if spread.shape != values.shape or not np.all(np.isfinite(spread) & (spread >= 0.0)):
+            raise InputError("noise holds no standard deviation, a finite number of 0 or more, for some trial.")
         total = len(inputs) + len(waiting)
         given = np.arange(total) if numbers is None or total == 0 else np.asarray(numbers)
         whole = given.shape == (total,) and given.dtype.kind in "iu" and np.all(given >= 0)
         if not whole or len(np.unique(given)) < total:
             raise InputError(f"numbers are {numbers!r}; give {total} different whole numbers, those pending last.")
         self._outputs = [tuple(row) for row in measured.tolist()]
-        self._executions = of.tolist()
+        self._executions, self._deviations = of.tolist(), spread.tolist()
         self._commanded, self._reached = list(inputs), list(actual)
         self._values, self._numbers = values.tolist(), given[: len(values)].tolist()
         self._pending = dict(zip(given[len(values) :].tolist(), waiting, strict=True))
@@ -271,6 +284,7 @@ class Trials:
             and np.array_equal(self.reached, other.reached)
             and np.array_equal(self.outputs, other.outputs, equal_nan=True)
             and np.array_equal(self.executions, other.executions)
+            and np.array_equal(self.deviations, other.deviations)
         )
 
     def of_output(self, k: int) -> "Trials":
@@ -279,12 +293,15 @@ class Trials:
 
     def without_failed(self) -> "Trials":
         """Return the trials that gave a value."""
-        return self._with(self.values)
+        return self._with(self.values, self.deviations)
 
-    def _with(self, values: NDArray[np.float64]) -> "Trials":
+    def _with(self, values: NDArray[np.float64], deviations: NDArray[np.float64] | None = None) -> "Trials":
         some = np.isfinite(values)
         found = Trials(self._box)
-        found.restore_cube(self.commanded[some], values[some], self.reached[some], (), self.numbers[some])
+        spread = None if deviations is None else deviations[some]
+        found.restore_cube(
+            self.commanded[some], values[some], self.reached[some], (), self.numbers[some], deviations=spread
+        )
         return found
 
     def forget(self, x: Any) -> None:
@@ -389,3 +406,18 @@ def number_of(y: Any) -> float:
     if value.size != 1 or not np.isfinite(value).all():
         raise InputError(f"y is {y!r}; give one finite number, or failed=True for a trial that gave nothing.")
     return float(value.reshape(()))
+
+
+def told_noise(noise: Any, wanted: bool) -> float:
+    """Return the standard deviation told with a value, 0 where none is wanted; raises InputError where it is bad."""
+    if not wanted:
+        if noise is not None:
+            raise InputError("noise= goes with a value, and with an optimizer that was made with noise='told'.")
+        return 0.0
+    try:
+        value = float(numbers_of(noise).reshape(())) if noise is not None else np.nan
+    except (TypeError, ValueError, OverflowError):
+        value = np.nan
+    if not (np.isfinite(value) and value >= 0.0):
+        raise InputError(f"noise is {noise!r}; tell the standard deviation of y, a finite number of 0 or more.")
+    return value

@@ -17,10 +17,12 @@ from surehold.optimization.surrogates.local_global import LocalGlobalProcess
 from surehold.optimization.surrogates.protocol import Surrogate
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, least_leaf_width
 
-__all__ = ["DEFAULT_SURROGATE", "SURROGATES", "refuse_settings", "surrogate_named"]
+__all__ = ["DEFAULT_SURROGATE", "SURROGATES", "TELLABLE", "refuse_settings", "surrogate_named"]
 
 SURROGATES: Final = ("two_scales", "gp", "tgp", "local_global")
 DEFAULT_SURROGATE: Final = "two_scales"
+#: Those that take the observation noise of single trials.
+TELLABLE: Final = ("two_scales", "gp", "tgp")
 
 
 def surrogate_named(

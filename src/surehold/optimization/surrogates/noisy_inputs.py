@@ -24,6 +24,7 @@ def condition_on_noisy_inputs(
     y: NDArray[np.float64],
     roots: NDArray[np.float64],
     seed: list[int],
+    told: NDArray[np.float64] | None = None,
 ) -> Posterior:
     """Return the surrogate conditioned on trials whose inputs strayed.
 
@@ -37,8 +38,10 @@ def condition_on_noisy_inputs(
         Root of the input noise's covariance at each trial; 0 where the reached input is known.
     seed
         Of the surrogate's random numbers, the same in every round.
+    told : (n,)
+        Standard deviation of the observation noise of each trial, in place of the surrogate's.
     """
-    known = surrogate.known_noise
+    known = surrogate.known_noise if told is None else told
     if known is None:
         return surrogate.condition(X, y, np.random.default_rng(seed))
     spread = float(np.abs(y - y.mean()).mean())
