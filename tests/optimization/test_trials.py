@@ -159,7 +159,7 @@ STRAYING = {"noise_while_exploring": True, "input_noise": NOISE}
 @pytest.mark.parametrize("settings", [STRAYING, {"input_noise": NOISE}, {}])
 def test_a_hand_that_strays_over_the_border_is_learnt_from(settings):
     rng = np.random.default_rng(0)
-    optimizer = Optimizer(BOX, seed=0, **settings)
+    optimizer = Optimizer(BOX, surrogate="gp", seed=0, **settings)
     outside = 0
     for _ in range(25):
         x = optimizer.ask()

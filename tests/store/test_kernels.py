@@ -3,8 +3,11 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+from surehold.store import kernels
 
 KERNELS = """
 from surehold.store.kernels import njit
@@ -95,3 +98,32 @@ def test_on_a_full_disk_it_runs_and_says_so_once(place):
     said = _answer(place, FULL_DISK)
     assert said.startswith("compiled kernels cannot be kept (File too large)")
     assert said.count("\n") == 1
+
+
+def test_a_kernel_is_compiled_anew_where_one_that_it_calls_has_changed(tmp_path):
+    """Numba itself would go on with the machine code of before."""
+    package = tmp_path / "surehold" / "store"
+    package.mkdir(parents=True)
+    source = Path(kernels.__file__).read_text(encoding="utf-8")
+    for folder in (package.parent, package):
+        (folder / "__init__.py").write_text("")
+    (package / "kernels.py").write_text(source)
+    (package.parent / "outer.py").write_text(
+        "from surehold.store.kernels import njit\nfrom surehold.inner import inner\n"
+        "@njit\ndef outer(x):\n    return 10 * inner(x)\nprint(outer(1))\n"
+    )
+    found = []
+    for number in (1, 1, 2):
+        (package.parent / "inner.py").write_text(
+            f"from surehold.store.kernels import njit\n@njit\ndef inner(x):\n    return x + {number}\n"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", "import surehold.outer"],
+            env=os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+            cwd=tmp_path,
+        )
+        found.append(int(done.stdout))
+    assert found == [20, 20, 30]

@@ -132,7 +132,7 @@ def test_parameters_reach_the_function_as_numbers_or_by_name():
 
     mixed = SearchSpace({"n": IntDistribution(1, 3), "c": CategoricalDistribution(["p", "q"])})
     outcome = trial_function(lambda p: p["n"] * (10 if p["c"] == "q" else 1), mixed)({"n": 3, "c": "q"})
-    assert outcome == (30.0, "")
+    assert outcome == (30.0, "", {})
 
 
 def test_the_problem_of_a_study_is_found_again(tmp_path):

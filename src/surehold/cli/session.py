@@ -234,7 +234,8 @@ def _as_study(
     from surehold.studies.worker import work
 
     logging.set_verbosity(logging.WARNING)
-    optimizer = {name: value for name, value in options.items() if name != "input_noise" and value is not None}
+    others = ("input_noise", "direction")
+    optimizer = {name: value for name, value in options.items() if name not in others and value is not None}
     space = SearchSpace(problem.box)
     settings = StudySettings(space, options["input_noise"], units, optimizer, kept.problem, options["direction"])
     storage = kept.storage or os.environ.get("SUREHOLD_STORAGE", "")

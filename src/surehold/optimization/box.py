@@ -53,8 +53,8 @@ class Box:
     >>> box.to_unit([0.0, 0.03])
     array([0.5, 1. ])
     >>> mixed = Box({"force": (0.1, 10.0, "log"), "fingers": (2, 5, "int"), "grip": ["pinch", "power"]})
-    >>> mixed.as_dict(mixed.from_unit([0.5, 0.4, 0.1, 0.9]))
-    {'force': 1.0, 'fingers': 3, 'grip': 'power'}
+    >>> mixed.as_dict(mixed.from_unit([1.0, 0.4, 0.1, 0.9]))
+    {'force': 10.0, 'fingers': 3, 'grip': 'power'}
     """
 
     def __init__(self, bounds: Mapping[str, Any], *, uncontrolled: Mapping[Any, Any] | None = None):

@@ -294,9 +294,7 @@ def _told(optimizer: Optimizer, evaluation: Evaluation, index: int) -> Trial:
     try:
         if optimizer.outcome == "success" and not failure:
             if y not in (0.0, 1.0):
-                raise InputError(
-                    f"the function returned {y:g}, not True or False (or 1 or 0), as outcome='success' needs."
-                )
+                raise InputError(f"the function returned {y:g}, but outcome='success' needs True or False (or 1 or 0).")
             optimizer.tell(asked, success=bool(y))
         else:
             optimizer.tell(asked, None if failure else y, failed=bool(failure), constraints=outputs or None)

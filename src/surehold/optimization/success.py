@@ -19,7 +19,7 @@ def check_combination(settings: Mapping[str, Any]) -> None:
     """Raise InputError for settings of `Optimizer`, other than their defaults, that success has no use for."""
     defaults = {
         "direction": "maximize",
-        "surrogate": "gp",
+        "surrogate": None,
         "criterion": None,
         "noise": None,
         "output_range": None,

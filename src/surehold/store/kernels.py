@@ -10,6 +10,8 @@ import os
 import stat
 import tempfile
 from collections.abc import Callable
+from functools import cache as once
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +58,7 @@ def _saving_where_possible(dispatcher: Any) -> Any:
     kept = getattr(dispatcher, "_cache", None)
     if kept is None:  # NUMBA_DISABLE_JIT gives the function back
         return dispatcher
+    kept._cache_file._source_stamp = _sources()
     save = kept.save_overload
 
     def save_overload(*arguments: Any) -> None:
@@ -66,6 +69,21 @@ def _saving_where_possible(dispatcher: Any) -> Any:
 
     kept.save_overload = save_overload
     return dispatcher
+
+
+@once
+def _sources() -> str:
+    """Return what tells the sources of all kernels of this package from others.
+
+    A kernel contains those that it calls, of other files, too: numba itself looks at the kernel's own file only, and
+    would go on with what was compiled before another one was changed.
+    """
+    content = sha256()
+    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+        text = path.read_bytes()
+        if b"njit(" in text:
+            content.update(text)
+    return content.hexdigest()
 
 
 def _private_folder() -> Path:

@@ -5,7 +5,7 @@ from scipy.stats import kstest
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.input import Region, checked_rules
-from surehold.optimization.lattice import with_fixed
+from surehold.optimization.lattice import lattice_of
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.optimizer import Optimizer
@@ -73,7 +73,7 @@ def test_contradictory_constraints_are_named():
 
 
 def test_points_are_tested_where_they_are_tried():
-    held = with_fixed(None, BOX, {"b": 0.5})
+    held = lattice_of(BOX, {"b": 0.5})
     allowed = region("a + b <= 1", lattice=held)
     U = BOX.to_unit(np.array([[0.4, -1.0], [0.6, -1.0]]))
     assert allowed.contains(U).tolist() == [True, False]

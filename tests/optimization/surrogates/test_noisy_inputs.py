@@ -76,7 +76,7 @@ def test_straying_needs_input_noise_and_a_surrogate_that_takes_it(settings):
 def test_straying_is_the_same_with_a_surrogate_object(noise):
     rng = np.random.default_rng(3)
     X = rng.random((12, 2)) * [2.0, 5.0]
-    kinds = ({"noise": noise}, {"surrogate": sh.GaussianProcess(noise=noise)})
+    kinds = ({"surrogate": "gp", "noise": noise}, {"surrogate": sh.GaussianProcess(noise=noise)})
     named, given = (
         sh.Optimizer(BOX, input_noise=sh.InputNoise.unit(0.05), noise_while_exploring=True, **kind) for kind in kinds
     )

@@ -17,7 +17,6 @@ from math import erfc, exp, inf, log, pi, sqrt
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from surehold.optimization.numerics.cholesky import cholesky, solve_lower, solve_lower_transposed
@@ -52,21 +51,6 @@ class Counts(NamedTuple):
     """m2, prior variance of the constant mean"""
     kernel: int
     """number of the kernel"""
-
-
-_COUNTS_TYPE: Final = types.NamedTuple(
-    (
-        types.float64[:, ::1],
-        types.float64[::1],
-        types.float64[::1],
-        types.float64[::1],
-        types.float64[::1],
-        types.float64,
-        types.float64,
-        types.int64,
-    ),
-    Counts,
-)
 
 
 @njit(cache=True)
@@ -179,7 +163,7 @@ def prior_covariance(theta, counts, K):
             K[k, i] = K[i, k]
 
 
-@njit(types.float64(types.float64[::1], _COUNTS_TYPE), cache=True)
+@njit(cache=True)
 def log_posterior(theta, counts):
     """Return the approximate log evidence plus the log prior of theta, up to a constant."""
     value = 0.0
