@@ -110,12 +110,12 @@ def test_a_kernel_is_compiled_anew_where_one_that_it_calls_has_changed(tmp_path)
     (package / "kernels.py").write_text(source)
     (package.parent / "outer.py").write_text(
         "from surehold.store.kernels import njit\nfrom surehold.inner import inner\n"
-        "@njit\ndef outer(x):\n    return 10 * inner(x)\nprint(outer(1))\n"
+        "@njit(cache=True)\ndef outer(x):\n    return 10 * inner(x)\nprint(outer(1))\n"
     )
     found = []
     for number in (1, 1, 2):
         (package.parent / "inner.py").write_text(
-            f"from surehold.store.kernels import njit\n@njit\ndef inner(x):\n    return x + {number}\n"
+            f"from surehold.store.kernels import njit\n@njit(cache=True)\ndef inner(x):\n    return x + {number}\n"
         )
         done = subprocess.run(
             [sys.executable, "-c", "import surehold.outer"],
