@@ -24,7 +24,7 @@ check: .venv/.developer
 # The main public paths on the oldest libraries that pyproject.toml allows.
 lowest: .venv/.developer
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(LOWEST)
-	$(BIN)/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct '.[all]'
+	$(BIN)/uv pip install --quiet --system-certs --python $(LOWEST) --resolution lowest-direct '.[all]'
 	$(LOWEST)/bin/python .ci/smoke.py
 
 bench: .venv/.developer

@@ -44,7 +44,7 @@ def surrogates() -> None:
 
 
 def grasps() -> None:
-    problem = sh.problems.Grasp("mug", variables=("dx", "dy"))
+    problem = sh.problems.GraspProblem("mug", variables=("dx", "dy"))
     assert problem.grasp(problem.box.from_unit([0.5, 0.5])).status in sh.grasping.STATUSES
     import trimesh
 
