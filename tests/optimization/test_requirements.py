@@ -216,3 +216,12 @@ def test_a_whole_run_takes_outputs_and_survives_missing_ones():
 def test_bad_settings(settings, message):
     with pytest.raises(InputError, match=message):
         Optimizer(BOX, **settings)
+
+
+def test_while_nothing_is_feasible_everything_promises():
+    optimizer = Optimizer(Box.unit(2), constraints={"torque": (None, 0.0)}, n_initial=3, seed=0)
+    for _ in range(4):
+        optimizer.tell(optimizer.ask(), 1.0, constraints={"torque": 1.0})
+    assert optimizer.promise() == np.inf
+    with pytest.raises(InputError, match="torque"):
+        optimizer.tell(optimizer.ask(), 1.0, constraints={"torque": 10**400})
