@@ -19,6 +19,8 @@ def promise(ranking: Ranking, posterior: Posterior, history: History, rng: np.ra
     Over the best input tried so far. Of a risk measure its improvement; of the worst case that of the mean, for the
     worst case has no distribution.
     """
+    if not len(history.tried):  # nothing feasible is known: whatever is, is an improvement
+        return float("inf")
     scale: Scale = "exact" if ranking.exact_inputs else "robust"
     if ranking.risk.name in ("mean", "worst"):
         best, anchors = replace(ranking, risk=Risk()).incumbent(posterior, history, scale)

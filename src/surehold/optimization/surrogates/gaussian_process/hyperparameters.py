@@ -150,7 +150,10 @@ def _learn_one_or_two_scales(evidence: Evidence, learning: Learning, rng: np.ran
     log_one, root_one = log_evidence_and_root(long, one)
     log_two, root_two = log_evidence_and_root(evidence, two)
     cost = cost_one + cost_two + one.size + two.size + 2
-    two_scales = 1.0 / (1.0 + exp(min(max(log_one - log_two, -_SURE), _SURE)))
+    margin = log_one - log_two
+    if np.isnan(margin):  # neither has an evidence: the simpler one
+        margin = _SURE
+    two_scales = 1.0 / (1.0 + exp(min(max(margin, -_SURE), _SURE)))
     m = 1 if learning.method == "map" else learning.particles
     keep = round(two_scales * m)
     if learning.method == "map":
