@@ -5,6 +5,7 @@ import pytest
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
+from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 
 BOX = Box({"a": (0.0, 1.0), "b": (-1.0, 2.0)})
@@ -70,3 +71,20 @@ def test_values_at_the_ends_of_the_numbers_do_no_harm(values):
         optimizer.tell(optimizer.ask(), value)
     assert BOX.contains(optimizer.recommend().x)
     assert BOX.contains(optimizer.ask())
+
+
+def test_numbers_beyond_the_range_of_floats():
+    huge = 10**400
+    for name in ("k", "kappa", "noise", "feasible"):
+        with pytest.raises(InputError, match=f"^{name} is "):
+            Optimizer(BOX, **{name: huge})
+    for value in (huge, 1e308):
+        with pytest.raises(InputError, match="standard deviation"):
+            InputNoise.unit(value)
+        with pytest.raises(InputError, match="standard deviation"):
+            InputNoise({"a": value})
+    with pytest.raises(InputError, match="not a numeric matrix"):
+        InputNoise(covariance=[[huge]])
+    optimizer = Optimizer(BOX, constraints={"torque": (None, 0.0)})
+    with pytest.raises(InputError, match="torque"):
+        optimizer.tell([0.5, 0.5], 1.0, constraints={"torque": huge})

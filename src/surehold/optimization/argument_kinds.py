@@ -25,7 +25,13 @@ def _flag(value: Any) -> bool:
 
 
 def _number(value: Any) -> bool:
-    return isinstance(value, (Real, np.number)) and not _flag(value)
+    if _flag(value) or not isinstance(value, (Real, np.number)):
+        return False
+    try:
+        float(value)
+    except (TypeError, OverflowError):  # complex, or an integer beyond the range of floats
+        return False
+    return True
 
 
 def _pair(value: Any) -> bool:

@@ -52,7 +52,7 @@ def limits_of(constraints: Mapping[str, Sequence[float | None]] | None) -> tuple
             lower, upper = pair
             low = -np.inf if lower is None else _number(lower)
             high = np.inf if upper is None else _number(upper)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(
                 f"limits of '{name}' are {pair!r}; give (lower, upper), None where there is none."
             ) from None
@@ -115,7 +115,7 @@ def checked_outputs(
         value = given.get(limit.name)
         try:
             number = np.nan if value is None else _number(value)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"constraint '{limit.name}' is {value!r}; give one finite number, or None.") from None
         if value is not None and not np.isfinite(number):
             raise InputError(f"constraint '{limit.name}' is {value!r}; give one finite number, or None.")

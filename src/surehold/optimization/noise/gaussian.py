@@ -102,9 +102,9 @@ def checked_deviation(name: str, value: float) -> float:
     """Return a standard deviation; raises InputError if it is negative, not finite or not a number."""
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = np.nan
-    if not np.isfinite(number) or number < 0.0:
+    if not 0.0 <= number <= 1e150:  # its square stays finite
         raise InputError(f"input noise of {name} is {value!r}; a standard deviation is a finite number of 0 or more.")
     return number
 
@@ -123,7 +123,7 @@ def checked_covariance(covariance: ArrayLike) -> NDArray[np.float64]:
     """
     try:
         matrix = np.array(covariance, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"input-noise covariance {covariance!r} is not a numeric matrix.") from None
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.size == 0:
         raise InputError(f"input-noise covariance has shape {matrix.shape}; it must be square (d, d).")
