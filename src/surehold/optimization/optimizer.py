@@ -24,6 +24,7 @@ from surehold.defaults import (
 from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.argument_kinds import check_kinds
 from surehold.optimization.box import Box
 from surehold.optimization.compilation import compile_ahead
 from surehold.optimization.constraints.input import region_of
@@ -203,6 +204,7 @@ class Optimizer:
         given = {name: value for name, value in locals().items() if name not in ("self", "box")}
         if not isinstance(box, Box):
             raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
+        check_kinds(given)
         if direction not in ("maximize", "minimize"):
             raise unknown_name("direction", direction, ("maximize", "minimize"))
         if outcome not in ("value", "success"):
@@ -681,7 +683,7 @@ class Optimizer:
         """Return the largest improvement that a further input is expected to bring, in the outputs' units.
 
         Of the outcome under the input noise, over the best input tried so far; small where there is little left to
-        find. Raises InputError if no trial has given a value yet.
+        find, infinite where no trial may become the answer yet. Raises InputError if no trial has given a value yet.
         """
         with single_threaded():
             return promise(self._ranking, self.posterior, self._history, self._rng(4, len(self._trials)))

@@ -104,7 +104,7 @@ def checked_deviation(name: str, value: float) -> float:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         number = np.nan
-    if not np.isfinite(number) or number < 0.0:
+    if not 0.0 <= number <= 1e150:  # its square stays finite
         raise InputError(f"input noise of {name} is {value!r}; a standard deviation is a finite number of 0 or more.")
     return number
 

@@ -1,0 +1,90 @@
+"""Arguments of a kind that cannot be: one line that names them."""
+
+import numpy as np
+import pytest
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.optimizer import Optimizer
+
+BOX = Box({"a": (0.0, 1.0), "b": (-1.0, 2.0)})
+STRANGE = [
+    [1],
+    {},
+    (1, 2, 3),
+    np.array([1.0, 2.0]),
+    b"x",
+    complex(1, 1),
+    object(),
+    np.datetime64("2020-01-01"),
+    np.ma.masked,
+]
+NAMES = [
+    "direction",
+    "criterion",
+    "design",
+    "noise",
+    "quadrature",
+    "border",
+    "risk",
+    "noise_while_exploring",
+    "trust_region",
+    "preset",
+    "failures",
+    "outcome",
+    "feasible",
+    "safety",
+    "k",
+    "kappa",
+    "output_range",
+    "surrogate",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("value", STRANGE, ids=lambda value: type(value).__name__)
+def test_one_line_names_the_argument(name, value):
+    with pytest.raises(InputError, match=f"^{name} is ") as refused:
+        Optimizer(BOX, **{name: value})
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 250
+
+
+@pytest.mark.parametrize("value", [-1, "a", [1], np.array([1.0])])
+def test_fixed_is_a_dictionary(value):
+    with pytest.raises(InputError, match=r"^fixed is "):
+        Optimizer(BOX, fixed=value)
+
+
+def test_while_nothing_is_feasible_everything_promises():
+    optimizer = Optimizer(BOX, constraints={"torque": (None, 0.0)}, n_initial=3, seed=0)
+    for _ in range(4):
+        optimizer.tell(optimizer.ask(), 1.0, constraints={"torque": 1.0})
+    assert optimizer.promise() == np.inf
+
+
+@pytest.mark.parametrize("values", [(1e300, -1e300, 0.0, 1e299), (1e-320, 0.0, 1e-310, 0.0)])
+def test_values_at_the_ends_of_the_numbers_do_no_harm(values):
+    optimizer = Optimizer(BOX, n_initial=3, seed=0)
+    for value in values:
+        optimizer.tell(optimizer.ask(), value)
+    assert BOX.contains(optimizer.recommend().x)
+    assert BOX.contains(optimizer.ask())
+
+
+def test_numbers_beyond_the_range_of_floats():
+    huge = 10**400
+    for name in ("k", "kappa", "noise", "feasible"):
+        with pytest.raises(InputError, match=f"^{name} is "):
+            Optimizer(BOX, **{name: huge})
+    for value in (huge, 1e308):
+        with pytest.raises(InputError, match="standard deviation"):
+            InputNoise.unit(value)
+        with pytest.raises(InputError, match="standard deviation"):
+            InputNoise({"a": value})
+    with pytest.raises(InputError, match="not a numeric matrix"):
+        InputNoise(covariance=[[huge]])
+    optimizer = Optimizer(BOX, constraints={"torque": (None, 0.0)})
+    with pytest.raises(InputError, match="torque"):
+        optimizer.tell([0.5, 0.5], 1.0, constraints={"torque": huge})
