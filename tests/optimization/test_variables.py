@@ -160,3 +160,32 @@ def test_points_that_do_not_fit_are_refused(point, words):
     with pytest.raises(InputError, match=words):
         optimizer.tell(point, 0.0)
     assert len(optimizer.y) == 0
+
+
+def test_rules_are_of_the_variables_not_of_their_coordinates():
+    box = Box({"force": (0.1, 10.0, "log"), "n": (2, 5, "int"), "grip": ["pinch", "power"]})
+    seen = []
+
+    def gentle(p):
+        seen.append(p)
+        return p["grip"] == "power" or p["force"] < 1.0
+
+    optimizer = Optimizer(box, allowed=["force + n <= 5", gentle], n_initial=8, seed=0)
+    for _ in range(12):
+        trial = optimizer.ask_trial()
+        p = trial.parameters
+        assert p["force"] + p["n"] <= 5.0 + 1e-9
+        assert gentle(p)
+        optimizer.tell(trial, p["force"])
+    best = optimizer.recommend().parameters
+    assert best["force"] > 2.0, "the limit is of the force, not of its logarithm"
+    assert isinstance(seen[0]["n"], int)
+    with pytest.raises(InputError, match="'grip' is a choice"):
+        Optimizer(box, allowed="grip <= 1")
+    with pytest.raises(InputError, match="'forc' is unknown"):
+        Optimizer(box, allowed="forc <= 1")
+
+
+def test_a_box_shows_what_nobody_sets():
+    box = Box({"x": (0.0, 1.0)}, uncontrolled={"payload": [0.5, 1.0, 1.5]})
+    assert repr(box) == "Box({'x': (0, 1), 'payload': (0.5, 1.5)}, uncontrolled: payload)"

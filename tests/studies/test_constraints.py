@@ -179,3 +179,13 @@ def test_linear_constraints_count_in_the_parameters_own_units():
         made.tell(trial, 1.0)
     assert max(values) <= 0.2 + 1e-9
     assert np.ptp(values) > 0.04
+
+
+def test_a_parameter_with_one_value_counts_in_a_constraint():
+    space = {"a": (0.0, 1.0), "held": FloatDistribution(0.4, 0.4)}
+    sampler = sh.Sampler(space, allowed=["a + held <= 1", lambda p: p["held"] + p["a"] > 0.6], seed=0, n_initial=6)
+    made = optuna.create_study(sampler=sampler)
+    distributions = {"a": FloatDistribution(0.0, 1.0), "held": FloatDistribution(0.4, 0.4)}
+    for _ in range(6):
+        a = made.ask(distributions).params["a"]
+        assert 0.2 < a <= 0.6 + 1e-9

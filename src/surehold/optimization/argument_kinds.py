@@ -58,7 +58,10 @@ _KINDS: Final[dict[str, tuple[Callable[[Any], bool], str]]] = {
     "kappa": _NUMBER,
     "feasible": _NUMBER,
     "safety": (lambda value: value is None or _number(value), "a probability, or None"),
-    "noise": (lambda value: _text_or_none(value) or _number(value), "a name, a standard deviation, or None"),
+    "noise": (
+        lambda value: _text_or_none(value) or _number(value),
+        "the name of an observation noise, its standard deviation, or None",
+    ),
     "risk": (lambda value: isinstance(value, (str, Risk)), "a name, or a surehold.Risk"),
     "surrogate": (
         lambda value: _text_or_none(value) or callable(getattr(value, "condition", None)),

@@ -217,7 +217,11 @@ class Box:
             words = [repr(word) for word in variable.described[2:]]
             return f"({', '.join([f'{variable.low:g}', f'{variable.high:g}', *words])})"
 
-        return f"Box({{{', '.join(f'{v.name!r}: {shown(v)}' for v in self.variables)}}})"
+        inner = ", ".join(f"{v.name!r}: {shown(v)}" for v in self.variables)
+        if self.uncontrolled is None:
+            return f"Box({{{inner}}})"
+        held = [name for name, taken in zip(self.names, self.uncontrolled.held, strict=True) if taken]
+        return f"Box({{{inner}}}, uncontrolled: {', '.join(held)})"
 
 
 def _same(mine: Conditions | None, other: Conditions | None) -> bool:

@@ -138,8 +138,9 @@ class Optimizer:
         way of its own, so that `risk`, `trust_region` and the Thompson criteria cannot be combined with it.
     allowed
         Which inputs may be commanded: a `Linear` constraint or its text ("a + 2*b <= 3"), a function of x (d,) in the
-        box's units that returns True or False, or a list of these. Kept by every trial that is asked for and by every
-        answer. Perturbed points are treated as at the border of the box, see `border`.
+        box's units ({name: value} where the box is not plain) that returns True or False, or a list of these. Kept by
+        every trial that is asked for and by every answer. Perturbed points are treated as at the border of the box, see
+        `border`.
     constraints
         {name: (lower, upper)} of further outputs that each trial tells (`tell(x, y, constraints={name: value})`), in
         their own units; None where there is no limit. With (None, None) an output is recorded and modelled only.

@@ -38,7 +38,8 @@ class SearchSpace:
     Attributes
     ----------
     distributions : Optuna's distribution of each parameter
-    box : Box, or None where every parameter can take one value only
+    fixed : {name: value} of the parameters that can take one value only
+    box : Box of the others, None where there are none
 
     Raises
     ------
@@ -52,13 +53,13 @@ class SearchSpace:
         if not isinstance(parameters, Mapping) or not parameters:
             raise InputError(f"search space is {parameters!r}; give a Box, or {{name: distribution}} of Optuna.")
         self.distributions: Final = {name: _distribution(name, value) for name, value in parameters.items()}
-        self._fixed: dict[str, Any] = {}
+        self.fixed: Final[dict[str, Any]] = {}
         self._variables: dict[str, Variable] = {}
         for name, distribution in self.distributions.items():
             if distribution.single():
-                self._fixed[name] = _only_value(distribution)
+                self.fixed[name] = _only_value(distribution)
             self._variables[name] = _variable(name, distribution)
-        varying = {name: variable for name, variable in self._variables.items() if name not in self._fixed}
+        varying = {name: variable for name, variable in self._variables.items() if name not in self.fixed}
         self.box: Final = Box(varying) if varying else None
 
     def encode_all(self, rows: list[Mapping[str, Any]], *, anywhere: bool = False) -> NDArray[np.float64]:
@@ -78,7 +79,7 @@ class SearchSpace:
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """Return parameters of the box with those that can take one value only, in the order of this space."""
-        found = self._fixed | dict(parameters)
+        found = self.fixed | dict(parameters)
         return {name: found[name] for name in self.distributions}
 
     def contains(self, parameters: Mapping[str, Any]) -> bool:

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from surehold.defaults import REGION_KNOWN, REGION_POOL, REGION_SEARCH, REGION_SEARCH_CALLS
 from surehold.errors import InputError
 from surehold.optimization.box import Box
+from surehold.optimization.constraints.by_name import Rule, of_coordinates
 from surehold.optimization.constraints.linear import Linear
 from surehold.optimization.lattice import Lattice
 
-__all__ = ["Region", "Rule", "checked_rules", "region_of"]
-
-Rule = Linear | Callable[[NDArray[np.float64]], Any]
+__all__ = ["Region", "checked_rules", "region_of"]
 
 _ROUNDING: Final = 1e-9  # of a linear constraint's largest possible value: an input on its border is allowed
 _SHRINKS: Final = 40  # halvings, on average, of a chord before a step is given up
@@ -42,7 +41,7 @@ def checked_rules(allowed: Any) -> tuple[Rule, ...]:
         else:
             raise InputError(
                 f"allowed is {rule!r}; give sh.Linear({{name: weight}}, upper=...), a text such as 'a + 2*b <= 3', a "
-                "function of x (d,) that returns True or False, or a list of these."
+                "function that returns True or False, or a list of these."
             )
     return tuple(rules)
 
@@ -54,7 +53,7 @@ def region_of(
 
     Raises InputError as `checked_rules` and `Region` do, and where one of the first points is not allowed.
     """
-    rules = checked_rules(allowed)
+    rules = tuple(of_coordinates(box, rule) for rule in checked_rules(allowed))
     if not rules:
         return None
     region = Region(box, rules, lattice, seed, first)
@@ -156,7 +155,7 @@ class Region:
         if isinstance(answer, (bool, np.bool_)) or (isinstance(answer, np.ndarray) and answer.shape == ()):
             return bool(answer)
         raise InputError(
-            f"allowed returned {answer!r} at x = {self._box.as_dict(x)}; it takes one x (d,) and returns True or False."
+            f"allowed returned {answer!r} at x = {self._box.as_dict(x)}; give a function that returns True or False."
         )
 
     def _step(self, at: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
