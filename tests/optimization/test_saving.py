@@ -75,6 +75,8 @@ def test_bad_files(tmp_path):
         "damaged: TypeError|damaged: ValueError": json.dumps(data | {"trials": [TRIAL | {"commanded": [{}, 1.0]}]}),
         "outside of the box": json.dumps(data | {"trials": [TRIAL | {"commanded": [0.1, 1.1]}]}),
         "different whole numbers": json.dumps(data | {"trials": [TRIAL, TRIAL]}),
+        "damaged: OverflowError": json.dumps(data | {"trials": [TRIAL | {"value": 10**400}]}),
+        "'sead' is unknown; did you mean 'seed'": json.dumps(data | {"settings": {"sead": 1}}),
     }
     for words, text in cases.items():
         bad = tmp_path / "bad.json"

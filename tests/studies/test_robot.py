@@ -443,6 +443,12 @@ def test_a_study_of_a_newer_version_is_refused(robot):
         again(robot)
 
 
+def test_damaged_settings_are_named(robot):
+    robot.study.set_user_attr("surehold:settings", SETTINGS.to_json() | {"parameters": {"dx": None}})
+    with pytest.raises(InputError, match=r"settings of study .* are damaged"):
+        again(robot)
+
+
 def test_a_study_that_is_not_ours_is_refused(url):
     from surehold.studies.storage import open_storage
 

@@ -232,6 +232,10 @@ def _number(value: Any, place: str) -> float:
     """Return a finite float or raise InputError."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InputError(f"{place} must be a number, not {value!r}.")
-    if not np.isfinite(float(value)):
+    try:
+        number = float(value)
+    except OverflowError:  # an integer beyond the range of floats, too long to be shown
+        number = value = np.inf
+    if not np.isfinite(number):
         raise InputError(f"{place} must be finite, not {value!r}.")
-    return float(value)
+    return number

@@ -6,12 +6,13 @@ Legend: t trials told, failed ones included; p pending; d variables; o further o
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from inspect import signature
 from typing import Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.errors import InputError
+from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit
@@ -244,6 +245,10 @@ class Record(ABC):
         True
         """
         box, found, trials = saving.read(path, settings)
+        known = signature(cls).parameters
+        for name in found:
+            if name not in known:
+                raise unknown_name(f"setting of an optimizer, in {os.fspath(path)!r},", name, tuple(known)[1:])
         optimizer = cls(box, **found)
         optimizer._trials = trials
         return optimizer

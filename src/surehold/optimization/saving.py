@@ -115,7 +115,7 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
             raise ValueError("an input lies outside of the box")
     except InputError:
         raise
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
         raise InputError(f"file {shown} is damaged: {type(error).__name__}: {error}.") from None
     return box, settings, trials
 

@@ -93,7 +93,15 @@ class StudySettings:
                 f"study '{study.study_name}' was not created by surehold; create one of another name, and take its "
                 "trials over with: surehold study import."
             )
-        return cls.from_json(data)
+        try:
+            return cls.from_json(data)
+        except InputError:
+            raise
+        except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
+            raise InputError(
+                f"the settings of study '{study.study_name}' are damaged ({type(error).__name__}: {error}); restore "
+                "the storage from a copy."
+            ) from None
 
     def differences(self, other: "StudySettings") -> list[str]:
         """Return in words what `other` wants differently, empty where they agree."""

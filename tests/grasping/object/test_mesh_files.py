@@ -341,6 +341,15 @@ def test_what_is_no_mesh_is_named(tmp_path):
     refused(tmp_path / "old.glb", "is glTF 1; export", unit=None)
 
 
+def test_corners_of_two_coordinates_and_corners_that_nothing_uses(tmp_path):
+    text = box().export(file_type="obj")
+    flat = (line.rsplit(" ", 1)[0] if line.startswith("v ") else line for line in text.splitlines())
+    (tmp_path / "plane.obj").write_text("\n".join(flat))
+    refused(tmp_path / "plane.obj", "without three coordinates")
+    (tmp_path / "far.obj").write_text(text + "\nv 1e300 0 0\nv nan 0 0\n")
+    assert load_mesh(tmp_path / "far.obj", "mm").object.mass == pytest.approx(0.072)
+
+
 def test_pipes_and_devices_are_not_read(tmp_path):
     os.mkfifo(tmp_path / "pipe.stl")
     (tmp_path / "endless.obj").symlink_to("/dev/zero")

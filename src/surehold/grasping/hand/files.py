@@ -62,7 +62,10 @@ def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())[:160]
         raise InputError(f"{str(model)!r} is not a model that MuJoCo can read: {reason}.") from None
-    return _Builder(mujoco, compiled, described).hand()
+    try:
+        return _Builder(mujoco, compiled, described).hand()
+    except UnicodeDecodeError:
+        raise InputError(f"{str(model)!r} has names that are no UTF-8; save it as UTF-8.") from None
 
 
 def packaged_hand(config: str | Path) -> Hand:

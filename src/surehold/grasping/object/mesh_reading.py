@@ -65,6 +65,8 @@ def read_mesh(file: Path, kind: str) -> tuple[NDArray[np.float64], NDArray[np.in
         raise InputError(f"{file.name!r} cannot be read as {kind.upper()}: {reason}.") from None
     if not meshes:
         raise InputError(f"{file.name!r} holds no triangles; export a surface mesh.")
+    if any(mesh.vertices.shape[1:] != (3,) for mesh in meshes):
+        raise InputError(f"{file.name!r} has vertices without three coordinates; export the mesh again.")
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
     vertices = np.vstack([np.asarray(mesh.vertices, dtype=np.float64) for mesh in meshes])
     faces = np.vstack([np.asarray(mesh.faces) + start for mesh, start in zip(meshes, starts, strict=True)])

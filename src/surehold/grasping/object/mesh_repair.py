@@ -48,10 +48,11 @@ def repaired(name: str, vertices: Array, faces: Faces, unit: str) -> tuple[Array
 
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(f"{name!r} has triangles whose corners are not there (it has {len(vertices)} vertices).")
-    used = vertices[np.unique(faces)]
-    if not np.all(np.isfinite(used)):
+    used, renumbered = np.unique(faces, return_inverse=True)
+    vertices, faces = vertices[used], renumbered.reshape(faces.shape)
+    if not np.all(np.isfinite(vertices)):
         raise InputError(f"{name!r} has coordinates that are not finite; repair the mesh.")
-    size = np.ptp(used, axis=0)
+    size = np.ptp(vertices, axis=0)
     numbers = (f"{1e3 * s:.4g}" if s < 10.0 else f"{1e3 * s:,.0f}" for s in size)
     shown = f"{' x '.join(numbers)} mm in unit {unit}"
     if size.max() < _SMALLEST or size.max() > _LARGEST:
