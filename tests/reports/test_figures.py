@@ -39,6 +39,25 @@ def test_inline_figures_follow_the_page(gm_report):
     assert not any(color in text for color in PALETTE.values())
 
 
+def test_marks_say_which_trial_they_are(gm_report):
+    titles = [f"trial {i} & <b>" for i in range(gm_report.y.size)]
+    drawing = figures.svg_text(figures.trace(gm_report), "trace")
+    root = ElementTree.fromstring(figures.inline_svg(drawing, "trace", "trace", {"trials-told": titles}))
+    svg = "{http://www.w3.org/2000/svg}"
+    group = next(g for g in root.iter(f"{svg}g") if g.get("id") == "trace-trials-told")
+    marks = list(group.iter(f"{svg}use"))
+    assert [mark.find(f"{svg}title").text for mark in marks] == titles
+    assert np.all(np.diff([float(mark.get("x")) for mark in marks]) > 0.0), "trials from left to right"
+    assert len(list(root.iter(f"{svg}title"))) == len(titles)
+
+
+def test_marks_of_few_trials_are_found_too(rkhs_report):
+    traces = {"best_trace": rkhs_report.best_trace[:2], "robust_trace": None}
+    few = replace(rkhs_report, X=rkhs_report.X[:2], y=rkhs_report.y[:2], **traces)
+    drawing = figures.svg_text(figures.trace(few), "trace")
+    assert figures.inline_svg(drawing, "trace", "", {"trials-told": ["first", "second"]}).count("<title>") == 2
+
+
 def test_the_histogram_counts_every_query(gm_report):
     for candidate in gm_report.candidates:
         axes = figures.shake(gm_report, candidate).axes[0]

@@ -12,7 +12,7 @@ from surehold.reports.verdict import number
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["PALETTE", "draw_line", "draw_map", "draw_shake", "draw_trace", "style"]
+__all__ = ["PALETTE", "draw_line", "draw_map", "draw_shake", "draw_trace", "marked", "style"]
 
 #: Okabe and Ito's vermilion and blue (told apart by color-blind readers), darkened for contrast on white.
 PALETTE: Final = {"ink": "#1b1f25", "muted": "#68707b", "grid": "#d8dce2", "high": "#c24e00", "answer": "#0a65b3"}
@@ -55,6 +55,19 @@ def style(salt: str) -> Iterator[None]:
 
 def _role(report: RunReport, candidate: Candidate) -> str:
     return "high" if candidate is report.observed and len(report.candidates) > 1 else "answer"
+
+
+def marked(report: RunReport, view: Surface | None = None) -> dict[str, np.ndarray]:
+    """Return which trials (n,) the marks of a figure stand for, in their order, by the identifier of their group.
+
+    Of the trials that lie within the view, if it is a figure of one.
+    """
+    inside, initial = np.ones(report.y.size, dtype=bool), np.arange(report.y.size) < report.n_initial
+    if view is not None:
+        for variable, axis in zip(view.variables, view.axes, strict=True):
+            inside &= (report.X[:, variable] >= axis[0]) & (report.X[:, variable] <= axis[-1])
+    ok, failed = inside & ~report.failed, inside & report.failed
+    return {"trials-initial": ok & initial, "trials-later": ok & ~initial, "trials-failed": failed, "trials-told": ok}
 
 
 def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
@@ -123,12 +136,12 @@ def draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> No
         )
     sliced = len(report.variables) > 2
     X = report.X[:, [i, j]] * [first.factor, second.factor]
-    initial = np.arange(report.y.size) < report.n_initial
-    ok = ~report.failed
     alpha = 0.45 if sliced else 0.95
-    axes.scatter(*X[ok & initial].T, s=15, facecolors="none", edgecolors="white", linewidths=1.0, alpha=alpha)
-    axes.scatter(*X[ok & ~initial].T, s=11, c="white", edgecolors="black", linewidths=0.4, alpha=alpha)
-    axes.scatter(*X[~ok].T, s=18, c="white", marker="x", linewidths=1.0, alpha=alpha)
+    marks = marked(report, view)
+    empty, full, cross = (X[marks[name]].T for name in ("trials-initial", "trials-later", "trials-failed"))
+    axes.scatter(*empty, s=15, facecolors="none", edgecolors="white", linewidths=1.0, alpha=alpha, gid="trials-initial")
+    axes.scatter(*full, s=11, c="white", edgecolors="black", linewidths=0.4, alpha=alpha, gid="trials-later")
+    axes.scatter(*cross, s=18, c="white", marker="x", linewidths=1.0, alpha=alpha, gid="trials-failed")
     for candidate in report.candidates:
         _draw_candidate(axes, report, candidate, (i, j))
     axes.set(xlabel=first.label, ylabel=second.label, xlim=extent[:2], ylim=extent[2:])
@@ -178,10 +191,9 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
     axes.plot(t, view.mean, color=PALETTE["ink"], linewidth=1.2, label="model (mean ± 2 standard deviations)")
     if view.robust_mean is not None:
         axes.plot(t, view.robust_mean, color=PALETTE["answer"], linewidth=2.0, label="averaged over the input noise")
-    ok = ~report.failed
-    axes.plot(
-        report.X[ok, i] * variable.factor, report.y[ok], "o", color=PALETTE["muted"], markersize=3.5, label="trials"
-    )
+    ok = marked(report, view)["trials-told"]
+    told = {"s": 12, "color": PALETTE["muted"], "gid": "trials-told", "label": "trials", "zorder": 2.0}
+    axes.scatter(report.X[ok, i] * variable.factor, report.y[ok], **told)
     for candidate in report.candidates:
         role = _role(report, candidate)
         spread = 0.0 if candidate.noise is None else 2.0 * float(np.sqrt(candidate.noise[i, i])) * variable.factor
@@ -198,8 +210,7 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
             zorder=6,
             label=candidate.label,
         )
-    inside = ok & (report.X[:, i] >= view.axes[0][0]) & (report.X[:, i] <= view.axes[0][-1])
-    everything = np.concatenate([view.mean, report.y[inside]])
+    everything = np.concatenate([view.mean, report.y[ok]])
     margin = 0.25 * (everything.max() - everything.min()) or 1.0
     axes.set(xlabel=variable.label, ylabel=report.quality_name, xlim=(t[0], t[-1]))
     axes.set_ylim(everything.min() - margin, everything.max() + margin)
@@ -210,8 +221,9 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
 def draw_trace(axes: "Axes", report: RunReport) -> None:
     """Draw best and robust value by trial, over the values of the single trials."""
     k = np.arange(report.y.size)
-    axes.plot(k, report.y, "o", color=PALETTE["muted"], markersize=2.8, alpha=0.7, label="trial")
     failed = report.failed
+    told = {"s": 8, "color": PALETTE["muted"], "alpha": 0.7, "gid": "trials-told", "label": "trial", "zorder": 2.0}
+    axes.scatter(k[~failed], report.y[~failed], **told)
     if failed.any():
         floor = float(np.nanmin(report.y)) if (~failed).any() else 0.0
         axes.plot(

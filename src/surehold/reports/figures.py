@@ -6,7 +6,7 @@ these colors by CSS variables of the same names.
 
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -152,14 +152,17 @@ def png_bytes(figure: "Figure") -> bytes:
     return buffer.getvalue()
 
 
-def inline_svg(text: str, name: str, description: str) -> str:
+def inline_svg(text: str, name: str, description: str, hover: Mapping[str, Sequence[str]] | None = None) -> str:
     """Return an SVG document as an `<svg>` element for a page: as wide as its place, its colors CSS variables.
 
-    `name` keeps its identifiers apart from those of the other figures of the page.
+    `name` keeps its identifiers apart from those of the other figures of the page. `hover` are texts of the marks of
+    groups, by the group's identifier.
     """
     from markupsafe import escape
 
     text = text[text.index("<svg") :]
+    for group, texts in (hover or {}).items():
+        text = _titled(text, group, texts)
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", text, count=1)
     text = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
@@ -167,6 +170,24 @@ def inline_svg(text: str, name: str, description: str) -> str:
     for css, color in PALETTE.items():
         text = text.replace(color, f"var(--{css})")
     return text.replace("<svg", f'<svg role="img" aria-label="{escape(description)}"', 1)
+
+
+def _titled(text: str, group: str, titles: Sequence[str]) -> str:
+    """Return an SVG document in which each mark of a group has a title, which browsers show beside the pointer."""
+    from markupsafe import escape
+
+    start = text.find(f'<g id="{group}">')
+    if start < 0:
+        return text
+    start = max(start, text.find("</defs>", start, text.find("<g id=", start + 1)))
+    end = text.find("<g id=", start + 1) if "<g id=" in text[start + 1 :] else len(text)
+    left = iter(titles)
+    marks = re.sub(
+        r"<(use|path)\b([^>]*)/>",
+        lambda found: f"<{found[1]}{found[2]}><title>{escape(next(left))}</title></{found[1]}>",
+        text[start:end],
+    )
+    return text[:start] + marks + text[end:]
 
 
 def _figure(width: float, height: float) -> tuple["Figure", "Axes"]:

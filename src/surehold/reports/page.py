@@ -8,8 +8,9 @@ from typing import Any, Final
 import numpy as np
 
 from surehold.reports import figures
+from surehold.reports.drawing import marked
 from surehold.reports.glossary import glossary
-from surehold.reports.run_report import Candidate, RunReport, Scene
+from surehold.reports.run_report import Candidate, RunReport, Scene, Surface
 from surehold.reports.scene import scene_data
 from surehold.reports.verdict import change, coordinates, halved, number, verdict
 
@@ -41,6 +42,8 @@ def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
     if drawings is None:
         drawings = {name: figures.svg_text(figure, name) for name, figure in figures.figures(report).items()}
     shown = [c for c in report.candidates if c.scene is not None]
+    trials = _trials(report)
+    hover = _hover(report, trials)
     return (
         environment()
         .get_template("report.html.j2")
@@ -54,12 +57,13 @@ def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
             noise_text=_noise_text(report),
             two=len(report.candidates) > 1,
             cards=[_card(report, c, told.refused, drawings) for c in report.candidates],
-            maps=[_map(report, i, drawings) for i in range(len(report.surfaces))],
-            trace=Markup(figures.inline_svg(drawings["trace"], "trace", "Best and robust value by trial")),
+            maps=[_map(report, i, drawings, trials) for i in range(len(report.surfaces))],
+            trace=Markup(figures.inline_svg(drawings["trace"], "trace", "Best and robust value by trial", hover)),
+            figure_script=Markup((TEMPLATES / "figures.js").read_text(encoding="utf-8")),
             rows=table_rows(report),
             words=glossary(report),
             settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
-            trials=_trials(report),
+            trials=trials,
             **scene_context(shown, [_scene_note(c) for c in shown], [_label(report, c) for c in shown]),
         )
     )
@@ -191,15 +195,24 @@ def _noise_text(report: RunReport) -> str:
     return ", ".join(shown)
 
 
-def _map(report: RunReport, index: int, drawings: Mapping[str, str]) -> dict[str, Any]:
+def _hover(report: RunReport, trials: list[dict[str, Any]], view: Surface | None = None) -> dict[str, list[str]]:
+    """Return what is said beside the pointer over each mark of a trial, by group of marks."""
+    names, told = [*(variable.label for variable in report.variables), *report.choices], []
+    for trial in trials:
+        places = [f"{name} {value}" for name, value in zip(names, [*trial["x"], *trial["choices"]], strict=True)]
+        told.append("\n".join([f"trial {trial['number']}: {report.quality_name} {trial['y']}", *places]))
+    return {group: [told[i] for i in np.flatnonzero(which)] for group, which in marked(report, view).items()}
+
+
+def _map(report: RunReport, index: int, drawings: Mapping[str, str], trials: list[dict[str, Any]]) -> dict[str, Any]:
     from markupsafe import Markup
 
     view = report.surfaces[index]
     names = " and ".join(report.variables[i].name for i in view.variables)
-    pictures = []
+    hover, pictures = _hover(report, trials, view), []
     for robust, name in figures.surface_names(report, index).items():
         text = f"{'Unscented mean' if robust else 'Mean'} of the model over {names}, with the trials"
-        pictures.append(Markup(figures.inline_svg(drawings[name], name, text)))
+        pictures.append(Markup(figures.inline_svg(drawings[name], name, text, hover)))
     return {"note": view.note, "is_map": len(view.variables) == 2, "svgs": pictures}
 
 

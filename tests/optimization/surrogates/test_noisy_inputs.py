@@ -4,7 +4,7 @@ import pytest
 import surehold as sh
 from surehold.errors import InputError
 from surehold.optimization.surrogates.local_global import LocalGlobalProcess
-from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
+from surehold.optimization.surrogates.noisy_inputs import averaging, condition_on_noisy_inputs
 
 BOX = sh.Box({"x": (0.0, 2.0), "y": (0.0, 5.0)})
 
@@ -86,10 +86,25 @@ def test_straying_is_the_same_with_a_surrogate_object(noise):
     assert np.array_equal(named.predict(X), given.predict(X))
 
 
-def test_inferred_noise_contains_what_trials_stray():
-    X = np.random.default_rng(0).random((15, 2))
-    roots = np.broadcast_to(0.05 * np.eye(2), (15, 2, 2))
-    process = sh.GaussianProcess(noise="inferred")
-    found = condition_on_noisy_inputs(process, X, steep(X), roots, [0]).moments(X)
-    plain = process.condition(X, steep(X), np.random.default_rng([0])).moments(X)
-    assert np.array_equal(found.mean, plain.mean)
+@pytest.mark.parametrize("noise", [0.01, "inferred"])
+def test_a_hill_is_not_learnt_as_its_average(noise):
+    """Of a parabola, averaging takes off half the trace of Hessian times covariance: here 8 * 0.1**2 = 0.08."""
+    X = np.linspace(0.0, 1.0, 25)[:, None]
+    f = -8.0 * (X[:, 0] - 0.5) ** 2
+    roots = np.full((25, 1, 1), 0.1)
+    roots[::5] = 0.0  # reached inputs are known: the value there is that of the function
+    y = np.where(roots[:, 0, 0] > 0.0, f - 0.08, f)
+    found = condition_on_noisy_inputs(sh.GaussianProcess(noise=noise), X, y, roots, [0]).moments(X)
+    inside = slice(6, 19)
+    np.testing.assert_allclose(found.mean.mean(axis=0)[inside], f[inside], atol=0.025)
+
+
+def test_what_averaging_adds_is_half_the_trace_of_hessian_times_covariance():
+    rng = np.random.default_rng(4)
+    X = rng.random((60, 2))
+    hessian, root = np.array([[-3.0, 1.0], [1.0, 2.0]]), np.array([[0.05, 0.0], [0.03, 0.04]])
+    y = 0.5 * np.einsum("ni,ij,nj->n", X - 0.5, hessian, X - 0.5)
+    posterior = sh.GaussianProcess(kernel="squared_exponential").fit(X, y).posterior
+    inner = X[np.all(np.abs(X - 0.5) < 0.3, axis=1)]
+    added = averaging(posterior, inner, np.broadcast_to(root, (len(inner), 2, 2)))
+    np.testing.assert_allclose(added, 0.5 * np.trace(hessian @ root @ root.T), rtol=0.05)
