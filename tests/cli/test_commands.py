@@ -352,3 +352,18 @@ def test_a_study_minimizes(here, capsys):
     assert surehold("study recommend down") == 0
     assert surehold("study create up --parameters x=0:1 --direction sideways") == 2
     assert "maximize" in capsys.readouterr().err
+
+
+def test_a_run_of_successes_speaks_of_shares(here, capsys):
+    (here / "rig.py").write_text("def held(x):\n    return bool(0.4 < x[0] < 0.8)\n\ndef never(x):\n    return False\n")
+    line = "--outcome success --bounds x=0:1 --noise 0.03 --trials 14 --initial 8 --out"
+    assert surehold(f"maximize rig.py:held {line} found") == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert re.search(r"expected to succeed in [\d.]+ % of executions; of 100 tried again when the input is off", shown)
+    assert "sure that at least 90 % of executions" in shown
+    page = (here / "found" / "report.html").read_text()
+    for words in ("refused", "highest observed", "hit exactly", "worst of"):
+        assert words not in shown, words
+        assert words not in page, words
+    assert surehold(f"maximize rig.py:never {line} nothing") == 3
+    assert "None of 14 trials succeeded." in capsys.readouterr().out

@@ -135,6 +135,8 @@ def run_session(
         }
         if outcome != "value":
             options["outcome"] = outcome
+            quality_name, success_above = "success", 0.0
+            advice = "Give more trials, a wider box, or count as success what is easier to reach."
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
         console.print(
@@ -275,11 +277,12 @@ def _progress(
 ) -> Iterator[Callable[[int, float, float | None], None]]:
     """Show progress; yields what is told (trials done, best value, value of the recommendation)."""
     extreme = "lowest" if options["direction"] == "minimize" else "highest"
+    counted = options.get("outcome") == "success"  # of which the highest says nothing
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=None),
         MofNCompleteColumn(),
-        TextColumn(f"{extreme} [bold]{{task.fields[best]}}[/bold]"),
+        *([] if counted else [TextColumn(f"{extreme} [bold]{{task.fields[best]}}[/bold]")]),
         TextColumn("{task.fields[robust]}"),
         TimeElapsedColumn(),
     )
@@ -293,7 +296,8 @@ def _progress(
             phase = "initial design" if done < options["n_initial"] else "optimizing"
             progress.update(task, completed=done, description=phase, best=number(best), robust=robust)
             if not console.is_terminal and done % 10 == 0:
-                console.print(f"{done} of {trials} trials: {extreme} {number(best)} {robust}".rstrip())
+                best_so_far = "" if counted else f"{extreme} {number(best)} "
+                console.print(f"{done} of {trials} trials: {best_so_far}{robust}".rstrip())
 
         yield show
 
@@ -311,7 +315,8 @@ def _show(report: RunReport, path: Path, seconds: float, console: Console) -> No
     table.add_column("")
     for candidate in report.candidates:
         alone = len(report.candidates) == 1
-        table.add_column(f"{report.extreme} observed = recommended" if alone else candidate.label, overflow="fold")
+        same = alone and not report.counted
+        table.add_column(f"{report.extreme} observed = recommended" if same else candidate.label, overflow="fold")
     for name, cells in page.table_rows(report):
         table.add_row(_plain(name), *(_plain(cell) for cell in cells))
     told = verdict(report)

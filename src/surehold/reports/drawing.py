@@ -185,14 +185,15 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
     variable = report.variables[i]
     t = view.axes[0] * variable.factor
     if view.std is not None:
-        axes.fill_between(
-            t, view.mean - 2 * view.std, view.mean + 2 * view.std, color=PALETTE["muted"], alpha=0.22, linewidth=0
-        )
+        low, high = view.mean - 2 * view.std, view.mean + 2 * view.std
+        if report.counted:
+            low, high = np.maximum(low, 0.0), np.minimum(high, 1.0)
+        axes.fill_between(t, low, high, color=PALETTE["muted"], alpha=0.22, linewidth=0)
     axes.plot(t, view.mean, color=PALETTE["ink"], linewidth=1.2, label="model (mean ± 2 standard deviations)")
     if view.robust_mean is not None:
         axes.plot(t, view.robust_mean, color=PALETTE["answer"], linewidth=2.0, label="averaged over the input noise")
     ok = marked(report, view)["trials-told"]
-    told = {"s": 12, "color": PALETTE["muted"], "gid": "trials-told", "label": "trials", "zorder": 2.0}
+    told = {"s": 12, "color": PALETTE["muted"], "gid": "trials-told", "label": "trials", "zorder": 2.5}
     axes.scatter(report.X[ok, i] * variable.factor, report.y[ok], **told)
     for candidate in report.candidates:
         role = _role(report, candidate)
@@ -229,9 +230,15 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
         axes.plot(
             k[failed], np.full(failed.sum(), floor), "x", color=PALETTE["muted"], markersize=5, label="failed trial"
         )
-    axes.step(
-        k, report.best_trace, where="post", color=PALETTE["high"], linewidth=1.8, label=f"{report.extreme} value so far"
-    )
+    if np.isfinite(report.best_trace).any():
+        axes.step(
+            k,
+            report.best_trace,
+            where="post",
+            color=PALETTE["high"],
+            linewidth=1.8,
+            label=f"{report.extreme} value so far",
+        )
     if report.robust_trace is not None and np.isfinite(report.robust_trace).any():
         axes.plot(
             k,

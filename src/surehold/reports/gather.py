@@ -29,13 +29,16 @@ if TYPE_CHECKING:
 
 __all__ = ["answers", "candidate", "drawn_scene", "report_of"]
 
+_SHARES = (0.9, 0.99)  # of executions that succeed, of which the page says how sure they are
 _OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
 
 
 def answers(result: Result) -> dict[str, int]:
     """Return the trials to show by label, the best "observed" and "recommended"; one entry if they are the same."""
-    highest = result.best_index
     recommended = int(np.argmin(np.abs(result.optimizer.box.to_unit(result.X) - _unit_answer(result)).max(axis=1)))
+    if result.optimizer.outcome == "success":  # a trial that succeeded is no peak
+        return {"recommended": recommended}
+    highest = result.best_index
     if recommended == highest or np.array_equal(result.X[recommended], result.X[highest]):
         return {"recommended": highest}
     extreme = "lowest" if result.optimizer.direction == "minimize" else "highest"
@@ -55,6 +58,13 @@ def candidate(
 ) -> Candidate:
     """Return the candidate of trial `index` with its re-queries; what the model expects of it where that is known."""
     told = result.recommendation if label == "recommended" else None
+    counted = result.optimizer.outcome == "success"
+    if told is not None and counted:
+        sure = {
+            f"sure that at least {100 * share:.0f} % of executions succeed": told.probability_of_share(share)
+            for share in _SHARES
+        }
+        details = {**{name: f"{100.0 * p:.0f} %" for name, p in sure.items()}, **(details or {})}
     return Candidate(
         label,
         result.X[index],
@@ -63,9 +73,9 @@ def candidate(
         np.empty(0) if score is None else score.values,
         np.empty((0, result.X.shape[1])) if score is None else score.points,
         0 if score is None else score.n_failed,
-        None if told is None or score is None else told.mean,
+        None if told is None or (score is None and not counted) else told.mean,
         None if told is None or score is None else told.std,
-        None if told is None or score is None else told.expectation.std,
+        None if told is None or (score is None and not counted) else told.expectation.std,
         status,
         pose,
         details or {},
@@ -138,7 +148,7 @@ def report_of(
         for name, lower, upper in zip(box.names, box.lower, box.upper, strict=True)
         if name not in hidden
     )
-    y, minimized = result.y, optimizer.direction == "minimize"
+    y, minimized, counted = result.y, optimizer.direction == "minimize", optimizer.outcome == "success"
     robust = np.full(y.size, np.nan)
     for trial in result.trials:
         if trial.recommendation is not None and trial.index < y.size and optimizer.input_noise is not None:
@@ -149,7 +159,7 @@ def report_of(
         X=result.X[:, shown],
         y=y,
         n_initial=optimizer.n_initial,
-        best_trace=_running_best(y, minimized),
+        best_trace=np.full(y.size, np.nan) if counted else _running_best(y, minimized),
         candidates=tuple(
             replace(
                 candidate,
@@ -173,6 +183,7 @@ def report_of(
         notes=(*notes, *_of_constraints(result), *filter(None, [outliers_in_words(result.recommendation.outliers)])),
         choices=choices or {},
         minimized=minimized,
+        counted=counted,
     )
 
 

@@ -29,7 +29,10 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
     words = [("trial", "One input that was tried. Trials are numbered from 0.")]
     if report.n_initial:
         words.append(("initial design", "Trials spread evenly over all inputs, before there is a model to choose by."))
-    words.append(("hit exactly", "The value of the trial itself, which reached its input."))
+    if report.counted:
+        words.append(("success", "1 where a trial succeeded, 0 where it did not; the share of several executions."))
+    else:
+        words.append(("hit exactly", "The value of the trial itself, which reached its input."))
     if report.noise is not None:
         words += [
             (

@@ -12,7 +12,7 @@ from surehold.reports.drawing import marked
 from surehold.reports.glossary import glossary
 from surehold.reports.run_report import Candidate, RunReport, Scene, Surface
 from surehold.reports.scene import scene_data
-from surehold.reports.verdict import change, coordinates, halved, number, verdict
+from surehold.reports.verdict import change, coordinates, halved, number, percent, verdict
 
 __all__ = ["TEMPLATES", "environment", "render", "scene_context", "table_rows"]
 
@@ -129,7 +129,9 @@ def _vendored(name: str) -> str:
 def _label(report: RunReport, candidate: Candidate) -> dict[str, str]:
     alone = len(report.candidates) == 1
     role = "high" if candidate is report.observed and not alone else "answer"
-    text = f"{report.extreme.capitalize()} observed = recommended" if alone else candidate.label.capitalize()
+    text = candidate.label.capitalize()
+    if alone and not report.counted:
+        text = f"{report.extreme.capitalize()} observed = recommended"
     if not report.succeeded:
         role, text = "high", f"No success: {f'the {report.extreme} trial' if alone else candidate.label}"
     return {"role": role, "mark": "▲" if role == "high" else "●", "text": text}
@@ -144,7 +146,7 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
     if refused and shaken:
         tag = "refused" if label["role"] == "high" else "holds better"
     svg = None
-    if shaken:
+    if shaken and not report.counted:
         name = f"shake-{label['role']}"
         text = (
             f"Histogram of {candidate.values.size} re-queries of the {candidate.label} point: mean "
@@ -157,13 +159,15 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         "tag": tag,
         "tag_class": "no" if tag == "refused" else "yes",
         "where": coordinates(report, candidate),
-        "quality": number(candidate.quality),
-        "mean": number(candidate.mean) if shaken else "",
+        "quality": percent(candidate.predicted_mean) if report.counted else number(candidate.quality),
+        "quality_is": "of executions are expected to succeed" if report.counted else "hit exactly",
+        "mean": "" if not shaken else percent(candidate.mean) if report.counted else number(candidate.mean),
+        "mean_is": f"of {candidate.values.size} re-queries succeeded" if report.counted else "on average",
         "worst": number(candidate.worst),
         "std": number(candidate.std, 2),
         "n": candidate.values.size,
         "halved": halved(candidate),
-        "change": change(candidate) if shaken else "",
+        "change": change(candidate) if shaken and not report.counted else "",
         "svg": svg,
     }
 
@@ -233,8 +237,13 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
     if any(c.status for c in every):
         rows.append(row("status", lambda c: c.status or "–"))
     rows.append(row("trial, from 0", lambda c: "–" if c.trial is None else str(c.trial)))
-    rows.append(row(f"{report.quality_name}, hit exactly", lambda c: number(c.quality, 4)))
-    if any(c.values.size for c in every):
+    if report.counted:
+        rows.append(row("share of the trial that succeeded", lambda c: number(c.quality, 4)))
+        if any(c.values.size for c in every):
+            rows.append(row("share of perturbed re-queries that succeeded", lambda c: number(c.mean, 4)))
+    else:
+        rows.append(row(f"{report.quality_name}, hit exactly", lambda c: number(c.quality, 4)))
+    if any(c.values.size for c in every) and not report.counted:
         n = max(c.values.size + c.n_failed for c in every)
         rows.append(row(f"mean of {n} perturbed re-queries", lambda c: number(c.mean, 4)))
         rows.append(row("95 % of them are better than", lambda c: number(c.bad, 4)))
@@ -243,7 +252,9 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
         if any(c.n_failed for c in every):
             rows.append(row("re-queries without value", lambda c: str(c.n_failed)))
     if any(c.predicted_mean is not None for c in every):
-        rows.append(row("model: mean under the noise ± its uncertainty", lambda c: _expected(c, c.predicted_error)))
+        what = "share of executions that succeeds" if report.counted else "mean under the noise"
+        rows.append(row(f"model: {what} ± its uncertainty", lambda c: _expected(c, c.predicted_error)))
+    if any(c.predicted_mean is not None for c in every) and not report.counted:
         rows.append(row("model: one execution ± standard deviation", lambda c: _expected(c, c.predicted_std)))
     names = dict.fromkeys(name for c in every for name in c.details)
     rows.extend(row(name, lambda c, name=name: c.details.get(name, "–")) for name in names)

@@ -187,6 +187,7 @@ class RunReport:
     notes: tuple[str, ...] = ()
     choices: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: parameters that are no numbers: (n,) each
     minimized: bool = False  #: whether lower values are better
+    counted: bool = False  #: whether values are shares of executions that succeeded, 1 or 0 of a single one
 
     def __post_init__(self):
         n, d = self.y.size, len(self.variables)

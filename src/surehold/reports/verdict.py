@@ -10,7 +10,7 @@ from surehold.reports.run_report import Candidate, RunReport
 
 _NOTABLE: Final = 0.1  # share of the range of the values met from which on bad cases count as different
 
-__all__ = ["Verdict", "change", "coordinates", "halved", "number", "verdict"]
+__all__ = ["Verdict", "change", "coordinates", "halved", "number", "percent", "verdict"]
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,8 @@ def _of_the_run(report: RunReport) -> Verdict:
     told = report.y[~report.failed]
     if not report.succeeded:
         return _of_nothing(report)
+    if report.counted:
+        return _of_successes(report)
     if told.size > 1 and told.max() == told.min():
         return Verdict(
             f"All {told.size} trials gave the same {name}, {number(float(told[0]))}: nothing was found.",
@@ -147,12 +149,33 @@ def _of_nothing(report: RunReport) -> Verdict:
     """Return the verdict where no trial succeeded: no winner among them."""
     counts = sorted(report.outcomes.items(), key=lambda item: -item[1])
     ended = "; ".join(f"{n} × {status}" for status, n in counts)
-    limit = number(report.success_above)
+    met = f": no {report.quality_name} above {number(report.success_above)} was met" * (not report.counted)
     return Verdict(
-        f"None of {report.y.size} trials succeeded: no {report.quality_name} above {limit} was met.",
+        f"None of {report.y.size} trials succeeded{met}.",
         f"{f'How they ended: {ended}. ' if ended else ''}The point shown is no answer. {report.advice}".strip(),
         False,
     )
+
+
+def _of_successes(report: RunReport) -> Verdict:
+    """Return the verdict where trials succeed or fail: how often the recommended input does."""
+    answer, told = report.recommended, report.y[~report.failed]
+    expected = f"expected to succeed in {percent(answer.predicted_mean)} of executions"
+    again = ""
+    if answer.values.size:
+        again = f"; of {answer.values.size} tried again when {report.disturbance}, {percent(answer.mean)} succeeded"
+    sure = " ".join(f"The model is {value} {name}." for name, value in answer.details.items() if name[:5] == "sure ")
+    return Verdict(
+        f"The recommended point is {expected}{again}.",
+        f"It is {coordinates(report, answer)} ({_trial(answer)}). {percent(float(told.mean()))} of the {told.size} "
+        f"trials succeeded, those made to learn included. {sure}".strip(),
+        False,
+    )
+
+
+def percent(share: float | None) -> str:
+    """Return a share in percent."""
+    return "–" if share is None or not math.isfinite(share) else f"{100.0 * share:.3g} %"
 
 
 def _notable(report: RunReport) -> float:
