@@ -280,7 +280,7 @@ def _trials(report: RunReport) -> list[dict[str, Any]]:
     rows = []
     for i, (x, y) in enumerate(zip(report.X * factors, report.y, strict=True)):
         notes, style = (["initial"] if i < report.n_initial else []), ""
-        if report.observed.trial == i:
+        if report.observed.trial == i and not report.counted:
             notes.append(f"{report.extreme} observed")
             style = "best"
         if report.recommended.trial == i:
