@@ -11,6 +11,7 @@ from surehold.cli.doctor import doctor
 from surehold.cli.explore import explore
 from surehold.cli.grasp import grasp
 from surehold.cli.grasp_rate import grasp_rate
+from surehold.cli.hand import hands
 from surehold.cli.maximize import maximize
 from surehold.cli.scene import scene
 from surehold.cli.study import studies
@@ -47,6 +48,7 @@ def application() -> typer.Typer:
         app.command(direction, help=f"Find a {extreme} that still holds when the input is off.")(maximize)
     app.command()(doctor)
     app.add_typer(campaigns(), name="campaign")
+    app.add_typer(hands(), name="hand")
     app.add_typer(studies(), name="study")
 
     def show_version(asked: bool) -> None:

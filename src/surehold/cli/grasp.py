@@ -128,7 +128,7 @@ def grasp(
         return replace(
             candidate,
             status=outcome.status,
-            pose=f"palm at ({position}) mm, quaternion ({turn}), s1 = {outcome.s1:.2f} rad",
+            pose=f"palm at ({position}) mm, quaternion ({turn}), {posture_text(outcome.s1)}",
             details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
             | losses(problem, candidate.x, input_noise, seed)
             | physics,
@@ -197,6 +197,12 @@ def drawn(problem: Any, outcome: Any) -> Any:
     away = np.stack([draw.distances.distance(body.vertices) for draw in body.draws])
     meshes = shape_meshes(body.vertices, body.faces, np.sqrt(np.mean(away**2, axis=0)))
     return replace(scene, meshes=(*meshes, *scene.meshes[1:]))
+
+
+def posture_text(s1: float | tuple[float, ...]) -> str:
+    """Return the posture of a grasp in words."""
+    amplitudes = s1 if isinstance(s1, tuple) else (s1,)
+    return ", ".join(f"s{i + 1} = {s:.2f} rad" for i, s in enumerate(amplitudes))
 
 
 def losses(problem: Any, x: Any, noise: Any, seed: int) -> dict[str, str]:

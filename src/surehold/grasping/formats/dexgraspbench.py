@@ -61,7 +61,7 @@ def write_dexgraspbench_files(folder: str | Path, file: GraspFile, joints: Seque
             "obj_path": checked.object_file,
             "joint_names": list(joints),
             "confidence": grasp.confidence,
-            "posture": grasp.posture,
+            "posture": list(grasp.posture) if isinstance(grasp.posture, tuple) else grasp.posture,
         }
         if grasp.quality is not None:
             row["quality"] = grasp.quality

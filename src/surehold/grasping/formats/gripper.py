@@ -37,7 +37,7 @@ def stored_grasp(hand: Hand, grasp: Grasp, preshape: Preshape, name: str, confid
         pose.position,
         pose.quaternion,
         *(_named(hand, joints) for joints in (grasp.joints, grasp.open_joints, squeeze)),
-        posture=float(grasp.s1),
+        posture=grasp.s1,
         quality=float(grasp.quality),
     )
 

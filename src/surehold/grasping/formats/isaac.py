@@ -49,7 +49,7 @@ def write_isaac_file(path: str | Path, file: GraspFile) -> None:
             "pregrasp_cspace_position": dict(grasp.pregrasp_joints),
         }
         if grasp.quality is not None:
-            entries[grasp.name] |= {"quality": grasp.quality, "posture": grasp.posture}
+            entries[grasp.name] |= {"quality": grasp.quality, "posture": grasp_to_dict(grasp.posture)}
     content: dict[str, Any] = {
         "format": FORMAT,
         "format_version": VERSION,

@@ -34,8 +34,8 @@ class StoredGrasp:
     """Joint positions of the open hand."""
     squeeze_joints: Mapping[str, float] = field(default_factory=dict)
     """Targets of the joints of the hand that squeezes; formats that do not know them leave them out."""
-    posture: float = 0.0
-    """The posture variable s1 with which surehold closed the hand [rad]."""
+    posture: float | tuple[float, ...] = 0.0
+    """The posture variable s1 with which surehold closed the hand [rad], or the amplitudes s1, s2, .. of a synergy."""
     quality: float | None = None
     """What surehold rated the grasp; None if it did not."""
 
@@ -107,9 +107,15 @@ def checked_grasp(grasp: StoredGrasp, place: str) -> StoredGrasp:
         (x, y, z),
         (w, i, j, k),
         *joints,
-        posture=number(grasp.posture, f"{place}: posture"),
+        posture=_posture(grasp.posture, f"{place}: posture"),
         quality=None if grasp.quality is None else number(grasp.quality, f"{place}: quality"),
     )
+
+
+def _posture(value: Any, place: str) -> float | tuple[float, ...]:
+    if isinstance(value, (list, tuple)) and 0 < len(value) <= 4:
+        return numbers(value, len(value), place)
+    return number(value, place)
 
 
 def unit_quaternion(values: Any, place: str) -> tuple[float, ...]:

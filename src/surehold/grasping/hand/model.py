@@ -34,6 +34,8 @@ class Preshape(NamedTuple):
     s1_useful: tuple[float, float]  #: where s1 has an effect; both ends 0 for a preshape without posture
     s1_range: tuple[float, float]  #: range of s1 in the thesis preset
     s1_tries: tuple[float, ...]  #: values that the search of default poses tries
+    further: tuple[Array, ...] = ()  #: of further amplitudes s2, s3, ..: (f, j) each, as `posture`
+    further_ranges: tuple[tuple[float, float], ...] = ()  #: their ranges
 
 
 class HandModel(NamedTuple):

@@ -60,7 +60,7 @@ def described_file(path: str | Path, words: Mapping[str, Any]) -> DescribedFile:
         said = {name: value for name, value in said.items() if name not in _OBJECT}
     merged = checked_words({"object": ""} | said | given)
     _check_kinds(str(path), merged)
-    hand = described_hand(merged["hand"], merged["hand_config"])
+    hand = described_hand(merged["hand"], merged["hand_config"], merged["preshape"] or "")
     if file is None:
         file = read_grasps(path, joint_order(hand))
     name = merged["object"]
