@@ -1,7 +1,7 @@
 """A node that answers `grasping_msgs/action/GraspPlanning` from stored grasps, for MoveIt's pick pipelines.
 
 Parameters: files (grasps.yaml of `surehold grasp`, one or more), most (grasps that are returned), approach_axis (in the
-gripper's frame), approach_distance, retreat_distance [m], max_contact_force [N]. The goal's object is found by its name;
+gripper's frame), approach_distance, retreat_distance [m], max_contact_force [N]. The goal's object is found by name;
 its pose is the first of `mesh_poses` or `primitive_poses`, or the frame of its header itself.
 """
 

@@ -13,9 +13,10 @@ from typing import Any
 import rclpy
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
@@ -152,7 +153,7 @@ class Tuner(Node):
 
 def main() -> None:
     """Run the node."""
-    rclpy.init()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # what was set is set back before ROS ends
     executor = MultiThreadedExecutor()
     tuner = Tuner()
     executor.add_node(tuner)
@@ -160,7 +161,8 @@ def main() -> None:
     spinning.start()
     try:
         spinning.join()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        tuner.end()
+    except KeyboardInterrupt:
+        pass
     finally:
+        tuner.end()
         rclpy.try_shutdown()
