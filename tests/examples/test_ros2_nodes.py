@@ -155,7 +155,7 @@ def test_grasps_are_planned_from_a_stored_result(ros, tmp_path):
     assert (first.grasp_quality, first.max_contact_force, first.allowed_touch_objects) == (0.6, 8.0, ["mug"])
     p, q = first.grasp_pose.pose.position, first.grasp_pose.pose.orientation
     assert first.grasp_pose.header.frame_id == "table"
-    np.testing.assert_allclose([p.x, p.y, p.z], at.apply(stored[2].position) + [1.0, 2.0, 3.0], atol=1e-12)
+    np.testing.assert_allclose([p.x, p.y, p.z], at.apply(stored[2].position) + np.array([1, 2, 3]), atol=1e-12)
     found = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
     np.testing.assert_allclose(found, (at * turns[2]).as_matrix(), atol=1e-12)
     assert first.grasp_posture.joint_names == ["a", "b"]

@@ -151,7 +151,8 @@ def test_amplitudes_are_variables_of_a_grasp():
     )
     preshape = moved.preshapes["learned"]
     assert problem.units == ("m", "rad", "rad")
-    np.testing.assert_allclose(problem.box.bounds[1:], [preshape.s1_useful, preshape.further_ranges[0]])
+    limits = np.column_stack([problem.box.lower, problem.box.upper])[1:]
+    np.testing.assert_allclose(limits, [preshape.s1_useful, preshape.further_ranges[0]])
     x = problem.box.from_unit([0.5, 0.25, 0.75])
     assert problem.posture(x) == tuple(x[1:])
     assert problem.grasp(x).s1 == tuple(x[1:])
