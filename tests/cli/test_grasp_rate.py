@@ -7,6 +7,7 @@ import trimesh
 import yaml
 
 from surehold.cli import run
+from surehold.grasping import Simulator
 from surehold.grasping.formats import read_grasps
 
 
@@ -90,3 +91,17 @@ def test_a_file_that_is_none(here, capsys):
     assert run(["grasp", "mug", "--format", "step", "--out", "x"]) == 2
     assert "format of grasps 'step' is unknown" in " ".join(capsys.readouterr().err.split())
     assert not (here / "x").exists(), "said before the run"
+
+
+def test_what_was_rated_before_an_interruption_is_said(block, capsys, monkeypatch):
+    changed(block, lambda c: c["grasps"].update(second=dict(next(iter(c["grasps"].values())))))
+    grasp, closed = Simulator.grasp, []
+
+    def interrupted(self, pose, s1=0.0):
+        closed.append(pose)
+        if len(closed) == 2:
+            raise KeyboardInterrupt
+        return grasp(self, pose, s1)
+
+    monkeypatch.setattr(Simulator, "grasp", interrupted)
+    assert "Interrupted: 1 of 2 grasps are rated." in rated("held/grasps.yaml", capsys)

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from surehold.cli.grasp_options import object_of, takes_grasp_options
+from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.options import Seed
 
 __all__ = ["Formats", "grasp_rate"]
@@ -60,9 +60,17 @@ def _grasp_rate(
     def build(gripper: Any) -> Any:
         return described_simulator(words, body, gripper)
 
-    with announced(console):
+    rated = []
+    with announced(console), shown_progress("grasps", console) as progress:
         simulator = described_simulator(words, body, hand)
-        rated = rated_grasps(simulator, content, build, samples, seed)
+        try:
+            for one in rated_grasps(simulator, content, build, samples, seed):
+                rated.append(one)
+                progress(len(rated) / len(content.grasps))
+        except KeyboardInterrupt:
+            if not rated:
+                raise
+            console.print(f"Interrupted: {len(rated)} of {len(content.grasps)} grasps are rated.", soft_wrap=True)
     table = Table(title=None, show_edge=False, pad_edge=False, header_style="bold")
     columns = ["grasp", "confidence", "before", "status", "quality"]
     for column in columns + (["off: mean", "closed"] if samples else []) + (["physics"] if check else []):

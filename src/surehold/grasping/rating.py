@@ -1,6 +1,6 @@
 """Grasps of a file, closed and rated again."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from surehold.errors import InputError
@@ -28,8 +28,8 @@ def rated_grasps(
     build: Callable[[object], Simulator],
     samples: int = 0,
     seed: int = 0,
-) -> list[RatedGrasp]:
-    """Close the hand in every grasp of a file and rate it.
+) -> Iterator[RatedGrasp]:
+    """Close the hand in every grasp of a file, one after the other, and rate it.
 
     A grasp that surehold stored is closed as it was: with the preshape and its posture. Of another, the joints go from
     their open to their closed values, and on until they touch; where a file holds no joints the hand closes with the
@@ -53,7 +53,6 @@ def rated_grasps(
     InputError
         If the joints of a grasp are not those of the hand; the message names the grasp.
     """
-    rated = []
     for stored in file.grasps:
         chosen = simulator
         if stored.quality is None and stored.joints:
@@ -65,5 +64,4 @@ def rated_grasps(
         s1 = stored.posture if chosen is simulator else 0.0
         grasp = chosen.grasp(pose, s1)
         robust = robust_quality(chosen, pose, s1, n=samples, seed=seed) if samples else None
-        rated.append(RatedGrasp(stored, grasp, chosen, robust))
-    return rated
+        yield RatedGrasp(stored, grasp, chosen, robust)

@@ -139,7 +139,7 @@ def test_a_foreign_grasp_closes_from_open_to_closed_and_on_until_it_touches():
     assert rated.grasp.status == grasp.status == "ok"
     assert rated.grasp.quality == pytest.approx(grasp.quality, rel=0.3), "the same fingers touch about the same places"
     with pytest.raises(InputError, match="grasp 'g': the file's joints thumb are none of hand 'icub-left'"):
-        rated_grasps(simulator, replace(file, grasps=(replace(foreign, joints={"thumb": 1.0}),)), build)
+        list(rated_grasps(simulator, replace(file, grasps=(replace(foreign, joints={"thumb": 1.0}),)), build))
     with pytest.raises(InputError, match="open and closed are the same"):
         closing_hand(hand, own.pregrasp_joints, own.pregrasp_joints)
     from_open = closing_hand(hand, {}, loose).preshapes["file"]
