@@ -1,6 +1,7 @@
 """`surehold grasp rate`: a run's grasps of every format are rated again, and what does not fit is one line."""
 
 import json
+from copy import deepcopy
 
 import pytest
 import trimesh
@@ -94,7 +95,7 @@ def test_a_file_that_is_none(here, capsys):
 
 
 def test_what_was_rated_before_an_interruption_is_said(block, capsys, monkeypatch):
-    changed(block, lambda c: c["grasps"].update(second=dict(next(iter(c["grasps"].values())))))
+    changed(block, lambda c: c["grasps"].update(second=deepcopy(next(iter(c["grasps"].values())))))
     grasp, closed = Simulator.grasp, []
 
     def interrupted(self, pose, s1=0.0):
