@@ -26,9 +26,11 @@ class Node:
 
     def __init__(self, name):
         self.name, self.services, self.subscriptions = name, {}, {}
+        self._parameters = {}  # rclpy keeps its own there
 
     def declare_parameter(self, name, default):
-        return SimpleNamespace(value=self.given.get(name, default))
+        self._parameters[name] = self.given.get(name, default)
+        return SimpleNamespace(value=self._parameters[name])
 
     def get_logger(self):
         return SimpleNamespace(error=self.log.append)

@@ -118,7 +118,7 @@ class Tuner(Node):
         self._measure = str(self.declare_parameter("measure", "mean").value)
         self._start = str(self.declare_parameter("start", "").value)
         measured([0.0], self._measure)  # explains an unknown one at once
-        self._parameters = NodeParameters(self)
+        self._tuned = NodeParameters(self)
         self._metric = Metric(self, str(self.declare_parameter("metric", "metric").value))
         self._over = threading.Event()
         group = MutuallyExclusiveCallbackGroup()
@@ -127,10 +127,10 @@ class Tuner(Node):
     def make(self, request: Any, response: Any) -> Any:
         """Make one trial."""
         try:
-            rounded = self._parameters.set(by_node(dict(zip(request.names, request.values, strict=True))))
+            rounded = self._tuned.set(by_node(dict(zip(request.names, request.values, strict=True))))
             self._over.wait(self._settle)
             if self._start:
-                started = self._parameters.call(Trigger, self._start, Trigger.Request())
+                started = self._tuned.call(Trigger, self._start, Trigger.Request())
                 if not started.success:
                     raise RuntimeError(f"{self._start} refuses: {started.message}")
             response.value = measured(self._metric.during(self._duration, self._over), self._measure)
@@ -148,7 +148,7 @@ class Tuner(Node):
     def end(self) -> None:
         """Stop listening, and set what the parameters were before."""
         self._over.set()
-        self._parameters.restore()
+        self._tuned.restore()
 
 
 def main() -> None:
