@@ -58,7 +58,7 @@ def test_a_mesh_and_a_hand_of_ones_own(here, capsys):
     result = json.loads((here / "held" / "result.json").read_text())
     assert max(result["trials"]["y"]) > 0.0
     file = read_isaac_grasps(here / "held" / "grasps.yaml")
-    assert file.gripper_frame == "gripper"
+    assert (file.gripper_frame, file.gripper_file) == ("palm", "gripper.xml")
     assert set(file.grasps[0].joints) == {"left", "right"}
     assert json.loads((here / "held" / "grasps.json").read_text())
     assert (here / "held" / "grasp.png").exists()

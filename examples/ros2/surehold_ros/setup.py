@@ -9,5 +9,11 @@ setup(
         ("share/surehold_ros", ["package.xml"]),
     ],
     install_requires=["setuptools"],
-    entry_points={"console_scripts": ["explorer = surehold_ros.explorer:main"]},
+    entry_points={
+        "console_scripts": [
+            "explorer = surehold_ros.explorer:main",
+            "grasp_planner = surehold_ros.grasp_planner:main",
+            "tuner = surehold_ros.tuner:main",
+        ]
+    },
 )

@@ -153,7 +153,7 @@ class _Run:
     def write(self, folder: Path) -> Path:
         """Write page, numbers and picture, and return the page's path."""
         from surehold.cli.grasp import drawn
-        from surehold.grasping.formats import grasp_to_dict
+        from surehold.grasping.plain_data import grasp_to_dict
         from surehold.reports.run_report import Candidate
         from surehold.reports.scenes_page import render_scenes
         from surehold.reports.still import still_picture

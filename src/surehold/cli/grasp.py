@@ -11,6 +11,7 @@ import numpy as np
 import typer
 
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
+from surehold.cli.grasp_rate import Formats
 from surehold.cli.options import (
     Initial,
     Method,
@@ -83,6 +84,7 @@ def grasp(
     study: Study = "",
     storage: StudyStorage = "",
     check: Annotated[bool, typer.Option("--check", help="Shake the grasps found, by physics (MuJoCo).")] = False,
+    formats: Formats = "isaac",
     open_report: Open = False,
     **options: Any,
 ) -> None:
@@ -93,12 +95,14 @@ def grasp(
     from surehold.cli.compilation import announced
     from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
     from surehold.cli.terminal import terminal
-    from surehold.grasping.formats import grasp_to_dict
+    from surehold.grasping.formats.writing import checked_formats
+    from surehold.grasping.plain_data import grasp_to_dict
     from surehold.problems.grasp.description import described_grasp
     from surehold.reports.run_report import Candidate, RunReport
     from surehold.reports.still import still_picture
     from surehold.store.atomic import write_file
 
+    chosen = checked_formats(formats.split(","))
     names = [name.strip() for name in options["variables"].split(",") if name.strip()]
     described = {"object": obj, **options, "variables": names, "preset": simulator_preset(preset)}
     kept = Kept(study, storage, {"grasp": described})
@@ -124,7 +128,7 @@ def grasp(
         return replace(
             candidate,
             status=outcome.status,
-            pose=f"palm at ({position}) mm, quaternion ({turn}), s1 = {outcome.s1:.2f} rad",
+            pose=f"palm at ({position}) mm, quaternion ({turn}), {posture_text(outcome.s1)}",
             details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
             | losses(problem, candidate.x, input_noise, seed)
             | physics,
@@ -132,7 +136,7 @@ def grasp(
         )
 
     def also_write(report: RunReport, folder: Path) -> None:
-        write_grasps(outcomes, report, folder / "grasps.yaml")
+        write_grasps(outcomes, report, folder, chosen, described)
         every = {c.label: {"x": c.x, "grasp": outcomes.grasp(c.x)} for c in report.candidates}
         text = json.dumps(grasp_to_dict(every), indent=1, allow_nan=False)
         write_file(folder / "grasps.json", text + "\n")
@@ -195,6 +199,12 @@ def drawn(problem: Any, outcome: Any) -> Any:
     return replace(scene, meshes=(*meshes, *scene.meshes[1:]))
 
 
+def posture_text(s1: float | tuple[float, ...]) -> str:
+    """Return the posture of a grasp in words."""
+    amplitudes = s1 if isinstance(s1, tuple) else (s1,)
+    return ", ".join(f"s{i + 1} = {s:.2f} rad" for i, s in enumerate(amplitudes))
+
+
 def losses(problem: Any, x: Any, noise: Any, seed: int) -> dict[str, str]:
     """Return what a grasp of an object of unknown shape loses to the pose and to the shape, in words."""
     from surehold.problems.grasp.shape_loss import shape_loss
@@ -236,28 +246,17 @@ def checked(outcome: Any, console: Any) -> str:
     return text
 
 
-def write_grasps(outcomes: Outcomes, report: Any, path: Path) -> None:
-    """Write the candidates of a report as an Isaac grasp file."""
-    from surehold.grasping.formats import StoredGrasp, write_isaac_grasps
+def write_grasps(outcomes: Outcomes, report: Any, folder: Path, formats: Sequence[str], words: dict[str, Any]) -> None:
+    """Write the candidates of a report as files of grasps."""
+    from surehold.grasping.formats.gripper import stored_grasp
+    from surehold.grasping.formats.writing import write_grasps as written
+    from surehold.problems.grasp.stored import stored_words
 
     simulator = outcomes.problem.simulator
-
-    def joints(angles: Any) -> dict[str, float]:
-        names = simulator.hand.joint_names
-        return {name: float(angle) for name, angle in zip(names, angles.ravel(), strict=True) if name}
-
+    hand, preshape = simulator.hand, simulator.hand.preshapes[simulator.preshape]
     stored = []
     for candidate in report.candidates:
-        outcome = outcomes.grasp(candidate.x)
         worth = candidate.mean if candidate.values.size else candidate.quality
-        stored.append(
-            StoredGrasp(
-                candidate.label.replace(" ", "_"),
-                min(max(float(worth), 0.0), 1.0),
-                outcome.pose.position,
-                outcome.pose.quaternion,
-                joints(outcome.joints),
-                joints(outcome.open_joints),
-            )
-        )
-    write_isaac_grasps(path, stored, simulator.object.name, simulator.hand.name)
+        outcome = outcomes.grasp(candidate.x)
+        stored.append(stored_grasp(hand, outcome, preshape, candidate.label.replace(" ", "_"), worth))
+    written(folder, stored, simulator.object, hand, preshape, formats, stored_words(words))

@@ -11,12 +11,12 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 __all__ = ["object_of", "shown_progress", "takes_grasp_options"]
 
 
-def takes_grasp_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Let a command that takes `**options` take each option of a grasp by its name, but those it names itself."""
+def takes_grasp_options(command: Callable[..., None], without: tuple[str, ...] = ()) -> Callable[..., None]:
+    """Let a command that takes `**options` take each option of a grasp, but those it names itself and `without`."""
     from surehold.problems.grasp.options import OPTIONS
 
     first, *others, _ = signature(command).parameters.values()
-    own = {"object", *(parameter.name for parameter in others)}
+    own = {"object", *without, *(parameter.name for parameter in others)}
     added = []
     for name, option in OPTIONS.items():
         if name in own or option.text is None:

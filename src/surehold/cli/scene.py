@@ -32,9 +32,9 @@ def scene(
     """Browse objects, facets and modes: the best of 45 grasps in each, as a page, JSON and a picture."""
     from surehold.cli.compilation import announced
     from surehold.cli.terminal import terminal
-    from surehold.grasping.formats import grasp_to_dict
     from surehold.grasping.object.shipped import OBJECTS
     from surehold.grasping.pictures.scene import grasp_scene
+    from surehold.grasping.plain_data import grasp_to_dict
     from surehold.problems.grasp.default_poses import default_facet
     from surehold.problems.grasp.description import described_grasp, described_hand
     from surehold.problems.grasp.options import checked_words

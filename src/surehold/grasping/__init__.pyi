@@ -9,7 +9,6 @@ from .choices import QUALITIES as QUALITIES
 from .closing.contacts import Contacts as Contacts
 from .formats import GraspFile as GraspFile
 from .formats import StoredGrasp as StoredGrasp
-from .formats import grasp_to_dict as grasp_to_dict
 from .formats import read_isaac_grasps as read_isaac_grasps
 from .formats import write_isaac_grasps as write_isaac_grasps
 from .grasp import STATUSES as STATUSES
@@ -30,6 +29,7 @@ from .physics.check import GraspChecker as GraspChecker
 from .pictures.scene import Scene as Scene
 from .pictures.scene import SceneMesh as SceneMesh
 from .pictures.scene import grasp_scene as grasp_scene
+from .plain_data import grasp_to_dict as grasp_to_dict
 from .pose_noise import PoseNoise as PoseNoise
 from .pose_noise import RobustQuality as RobustQuality
 from .pose_noise import robust_quality as robust_quality

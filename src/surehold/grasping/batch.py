@@ -48,7 +48,7 @@ def grasp_batch(simulator: Simulator, poses: Sequence[Pose], s1: ArrayLike = 0.0
     poses
         Poses of the palm in the world, n of them.
     s1
-        Posture of each [rad], (n,), or one for all.
+        Posture of each [rad], (n,), or one for all; of a preshape with k amplitudes, (n, k).
     workers
         Number of processes; they start in about a second and stay for the next call.
 
@@ -60,9 +60,9 @@ def grasp_batch(simulator: Simulator, poses: Sequence[Pose], s1: ArrayLike = 0.0
     if isinstance(workers, bool) or not isinstance(workers, int | np.integer) or workers < 1:
         raise InputError(f"workers are {workers!r}; give an integer of 1 or more.")
     postures = np.asarray(s1, dtype=np.float64)
-    if postures.shape not in ((), (len(poses),)):
+    if postures.shape[:1] not in ((), (len(poses),)) or postures.ndim > 2:
         raise InputError(f"s1 has shape {postures.shape}; give one number or one for each of the {len(poses)} poses.")
-    postures = np.broadcast_to(postures, len(poses))
+    postures = postures if postures.ndim else np.broadcast_to(postures, len(poses))
     parts = [slice(start, start + _CHUNK) for start in range(0, len(poses), _CHUNK)]
     if workers == 1 or len(parts) < 2:
         rows = [_outcomes(simulator, poses[part], postures[part]) for part in parts]
@@ -88,7 +88,7 @@ def _outcomes(simulator: Simulator, poses: Sequence[Pose], postures: NDArray[np.
     """Return (n, 5): quality, status, penetration, contacts, fallbacks."""
     rows = np.empty((len(poses), 5))
     for row, pose, s1 in zip(rows, poses, postures, strict=True):
-        grasp = simulator.grasp(pose, float(s1))
+        grasp = simulator.grasp(pose, tuple(s1.tolist()) if np.ndim(s1) else float(s1))
         fallbacks = 0 if grasp.wrench is None else grasp.wrench.fallbacks
         row[:] = grasp.quality, STATUSES.index(grasp.status), grasp.penetration, len(grasp.contacts), fallbacks
     return rows

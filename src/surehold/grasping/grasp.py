@@ -27,7 +27,7 @@ class Grasp:
     status: Status  #: see `STATUSES`
     quality: float  #: the measure that was asked for; 0 without two contacts; a collision's is 0 or below
     pose: Pose  #: from the palm frame to the object's frame
-    s1: float  #: posture variable [rad]
+    s1: float | tuple[float, ...]  #: posture variable [rad]; all amplitudes of a preshape that has several
     joints: Array = field(
         repr=False
     )  #: (f, j) joint angles [rad] or shifts [m] at the end, in the hand's order; a collision leaves it open

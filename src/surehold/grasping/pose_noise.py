@@ -58,7 +58,7 @@ class RobustQuality:
 def robust_quality(
     simulator: Simulator,
     pose: Pose,
-    s1: float = 0.0,
+    s1: float | tuple[float, ...] = 0.0,
     *,
     noise: PoseNoise | None = None,
     n: int = 100,
@@ -87,7 +87,7 @@ def robust_quality(
         If n is not a positive integer, a bound is negative or not finite, a name is unknown, or the pose is not finite.
     """
     poses = disturbed_poses(simulator, pose, noise, n, seed, disturbed)
-    batch = grasp_batch(simulator, poses, s1, workers)
+    batch = grasp_batch(simulator, poses, np.tile(s1, (len(poses), 1)) if isinstance(s1, tuple) else s1, workers)
     collided = batch.status == STATUSES.index("initial collision")
     closed = batch.status == STATUSES.index("ok")
     values = np.where(collided, 0.0, batch.quality)

@@ -1,6 +1,5 @@
 """One trial: put the open hand at a pose, close it, find the contacts, measure how well they hold the object."""
 
-from math import isfinite
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -150,18 +149,20 @@ class Simulator:
         self._samples: Final[Array] = skin_samples(self.hand)
         self._no_contacts: Final = as_contacts(np.empty((0, 8)), self.hand)
 
-    def grasp(self, pose: Pose, s1: float = 0.0) -> Grasp:
+    def grasp(self, pose: Pose, s1: float | tuple[float, ...] = 0.0) -> Grasp:
         """Close the hand at a pose of its palm in the world with posture s1 [rad]; a bad grasp has quality 0.
+
+        Of a preshape with several amplitudes, `s1` may be all of them.
 
         Raises
         ------
         InputError
             If the pose or s1 is not finite.
         """
-        if not (isfinite(s1) and pose.is_finite):
+        if not (np.all(np.isfinite(s1)) and pose.is_finite):
             raise InputError(f"pose {pose} with s1 = {s1!r} is not finite; give finite numbers.")
         relative = self._to_object @ pose
-        motion = closing_motion(self.hand, float(s1), self.preshape)
+        motion = closing_motion(self.hand, s1 if isinstance(s1, tuple) else float(s1), self.preshape)
         geometry = self._place(relative)
         opened = motion.joints(0.0)
         depths = np.maximum(-self.gaps(relative, opened, geometry), 0.0)

@@ -355,3 +355,11 @@ def test_pipes_and_devices_are_not_read(tmp_path):
     (tmp_path / "endless.obj").symlink_to("/dev/zero")
     for name in ("pipe.stl", "endless.obj"):
         refused(tmp_path / name, "is no regular file")
+
+
+def test_a_scale_multiplies_the_unit(tmp_path):
+    path = stored(tmp_path, box())
+    scaled, plain = load_mesh(path, "m", scale=1e-3).object, load_mesh(path, "mm").object
+    np.testing.assert_allclose(scaled.vertices, plain.vertices, rtol=1e-12)
+    for scale in (0.0, -1.0, np.nan):
+        refused(path, "scale of 'part.stl'", "positive number", scale=scale)

@@ -46,16 +46,15 @@ class Closed(NamedTuple):
 
 
 @njit(cache=True)
-def _finger_at(f, t, bases, chains, motion, stop, ends):
-    """Write the link ends of finger f at time t; motion is (4, f, j): start, rate, lower, upper; stop (f, j)."""
-    joints = chains.shape[1]
-    q = np.empty(joints)
-    frames = np.empty((joints, 3, 4))
-    for j in range(joints):
+def _link_at(f, k, t, bases, chains, motion, stop, ends):
+    """Write the ends (2, 3) of link k of finger f at time t; motion is (4, f, j): start, rate, lower, upper."""
+    q = np.empty(k + 1)
+    frames = np.empty((k + 1, 3, 4))
+    for j in range(k + 1):
         angle = motion[0, f, j] + motion[1, f, j] * min(t, stop[f, j])
         q[j] = min(max(angle, motion[2, f, j]), motion[3, f, j])
-    finger_frames(bases[f], chains[f], q, frames)
-    axis_ends(frames, chains[f], ends)
+    finger_frames(bases[f], chains[f, : k + 1], q, frames)
+    axis_ends(frames[k:], chains[f, k : k + 1], ends.reshape(1, 2, 3))
 
 
 @njit(cache=True)
@@ -87,8 +86,8 @@ def _begins(f, k, motion, stop):
 @njit(cache=True)
 def _gap_at(f, k, t, nodes, frame, bases, chains, motion, stop, radius, ends):
     """Return the gap between link k of finger f and the object at time t [m]."""
-    _finger_at(f, t, bases, chains, motion, stop, ends)
-    return capsule_gap(nodes, frame, ends[k, 0], ends[k, 1], radius, 1e-6, 0.0)[0]
+    _link_at(f, k, t, bases, chains, motion, stop, ends)
+    return capsule_gap(nodes, frame, ends[0], ends[1], radius, 1e-6, 0.0)[0]
 
 
 @njit(cache=True)
@@ -112,6 +111,31 @@ def _closest(f, k, early, late, nodes, frame, bases, chains, motion, stop, radiu
     first = _gap_at(f, k, early, nodes, frame, bases, chains, motion, stop, radius, ends)
     last = _gap_at(f, k, late, nodes, frame, bases, chains, motion, stop, radius, ends)
     return t, (gap if gap < min(first, last) else np.inf)
+
+
+@njit(cache=True)
+def _sift(heap, i, open_until):
+    """Move the entry at place i of a heap down to where no gap below it is open for a shorter time.
+
+    The heap holds numbers of gaps, the one that is open for the shortest time first, of equals the lowest number.
+    """
+    n = heap.shape[0]
+    mine = heap[i]
+    t = open_until[mine]
+    while True:
+        child = 2 * i + 1
+        if child >= n:
+            break
+        best = heap[child]
+        if child + 1 < n:
+            other = heap[child + 1]
+            if open_until[other] < open_until[best] or (open_until[other] == open_until[best] and other < best):
+                child, best = child + 1, other
+        if open_until[best] > t or (open_until[best] == t and best > mine):
+            break
+        heap[i] = best
+        i = child
+    heap[i] = mine
 
 
 @njit(cache=True)
@@ -146,8 +170,8 @@ def close_hand(
     fingers, per_finger = radii.shape
     links = fingers * per_finger
     touched = np.zeros(links, dtype=np.bool_)
-    mine = np.empty((per_finger, 2, 3))
-    other = np.empty((per_finger, 2, 3))
+    mine = np.empty((2, 3))
+    other = np.empty((2, 3))
 
     # The gaps to watch: link - object, link - palm, link - link of another finger.
     most = links * (1 + palms.shape[0]) + links * links // 2
@@ -181,11 +205,12 @@ def close_hand(
     looked = np.full((links, 2), np.inf)  # gap at the last look and at the one before
     times = np.zeros((links, 2))
     looks = 0
+    heap = np.arange(total)
+    for k in range(total // 2 - 1, -1, -1):
+        _sift(heap, k, open_until)
     while True:
-        i = 0
-        for k in range(1, total):
-            if open_until[k] < open_until[i]:
-                i = k
+        _sift(heap, 0, open_until)  # the gap that was looked at last
+        i = heap[0]
         t = open_until[i]
         if t >= closed:
             break
@@ -199,17 +224,17 @@ def close_hand(
             continue
         looks += 1
         radius = radii[fa, ka]
-        _finger_at(fa, t, bases, chains, motion, stop, mine)
+        _link_at(fa, ka, t, bases, chains, motion, stop, mine)
         if b == -1:
-            gap = capsule_gap(nodes, frame, mine[ka, 0], mine[ka, 1], radius, 0.2 * TOUCH, 0.2)[0]
+            gap = capsule_gap(nodes, frame, mine[0], mine[1], radius, 0.2 * TOUCH, 0.2)[0]
             if gap < 2.0 * brush:  # a gap that is underrated now and then hides the closest approach
-                gap = capsule_gap(nodes, frame, mine[ka, 0], mine[ka, 1], radius, 0.2 * TOUCH, 0.0)[0]
+                gap = capsule_gap(nodes, frame, mine[0], mine[1], radius, 0.2 * TOUCH, 0.0)[0]
         elif b < -1:
-            gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[ka, 0], mine[ka, 1], radius)
+            gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[0], mine[1], radius)
         else:
             fb, kb = b // per_finger, b % per_finger
-            _finger_at(fb, t, bases, chains, motion, stop, other)
-            gap = capsule_pair_gap(mine[ka, 0], mine[ka, 1], other[kb, 0], other[kb, 1], radius + radii[fb, kb])
+            _link_at(fb, kb, t, bases, chains, motion, stop, other)
+            gap = capsule_pair_gap(mine[0], mine[1], other[0], other[1], radius + radii[fb, kb])
         if b == -1 and brush > 0.0:
             pass_leave[a] = max(pass_leave[a], gap)
             if looked[a, 0] < 1.5 * brush and looked[a, 0] <= looked[a, 1] and looked[a, 0] < gap:

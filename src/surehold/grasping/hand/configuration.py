@@ -29,7 +29,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from surehold.errors import InputError
-from surehold.grasping.formats import plain_yaml
+from surehold.grasping.plain_data import plain_yaml
 
 __all__ = ["Coupling", "HandConfig", "PackagedModel", "PalmConfig", "Posture", "PreshapeConfig", "read_hand_config"]
 

@@ -14,6 +14,7 @@ import importlib.util
 import stat
 import warnings
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.hand.configuration import HandConfig, PreshapeConfig, read_hand_config
 from surehold.grasping.hand.cover import SHORTEST, Capsule, cover_box, cover_mesh
-from surehold.grasping.hand.model import CLOSED, Hand, Preshape, chain_row
+from surehold.grasping.hand.model import CLOSED, Hand, HandModel, Preshape, chain_row
 
 __all__ = ["load_hand", "packaged_hand"]
 
@@ -63,7 +64,8 @@ def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
         reason = " ".join(str(error).split())[:160]
         raise InputError(f"{str(model)!r} is not a model that MuJoCo can read: {reason}.") from None
     try:
-        return _Builder(mujoco, compiled, described).hand()
+        builder = _Builder(mujoco, compiled, described)
+        return replace(builder.hand(), model=builder.source(str(model)))
     except UnicodeDecodeError:
         raise InputError(f"{str(model)!r} has names that are no UTF-8; save it as UTF-8.") from None
 
@@ -123,7 +125,7 @@ class _Builder:
             twice = next(model.joint(j).name for j in moving if moving.count(j) > 1)
             raise InputError(f"hand '{config.name}' names joint '{twice}' twice; a joint moves one finger.")
         for j in range(model.njnt):
-            if model.jnt_type[j] in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
+            if self._moves(j):
                 rest = 0.0 if j in moving else float(np.clip(0.0, *self._range(j)))
                 self.data.qpos[model.jnt_qposadr[j]] = rest
         mujoco.mj_kinematics(model, self.data)
@@ -182,6 +184,23 @@ class _Builder:
             finger_force=config.finger_force,
         )
 
+    def source(self, file: str) -> HandModel:
+        """Return the names and frames of the model at rest."""
+        rotation = self.data.xmat[self.palm_body].reshape(3, 3)
+        inside = np.column_stack([rotation.T @ self.turn, rotation.T @ (self.origin - self.data.xpos[self.palm_body])])
+        order = sorted((int(self.model.jnt_qposadr[j]), j) for j in self.joint_ids.values() if self._moves(j))
+        return HandModel(
+            file,
+            self.config.palm.body,
+            inside,
+            np.column_stack([self.turn, self.origin]),
+            tuple(self.model.joint(j).name for _, j in order),
+            tuple(float(self.data.qpos[place]) for place, _ in order),
+        )
+
+    def _moves(self, j: int) -> bool:
+        return self.model.jnt_type[j] in (int(self.mujoco.mjtJoint.mjJNT_HINGE), int(self.mujoco.mjtJoint.mjJNT_SLIDE))
+
     def _check_size(self, rows: list[dict[str, Any]]) -> None:
         """Raise InputError for a hand that is no hand by its size."""
         name, palm = self.config.name, self.config.palm
@@ -209,7 +228,7 @@ class _Builder:
         if name not in self.joint_ids:
             raise unknown_name("joint", name, [known for known in self.joint_ids if known])
         j = self.joint_ids[name]
-        if self.model.jnt_type[j] not in (int(self.mujoco.mjtJoint.mjJNT_HINGE), int(self.mujoco.mjtJoint.mjJNT_SLIDE)):
+        if not self._moves(j):
             raise InputError(f"joint '{name}' of hand '{self.config.name}' neither turns nor slides about one axis.")
         return j
 

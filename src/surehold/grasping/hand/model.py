@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CLOSED", "Hand", "Preshape", "chain_row"]
+__all__ = ["CLOSED", "Hand", "HandModel", "Preshape", "chain_row"]
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,19 @@ class Preshape(NamedTuple):
     s1_useful: tuple[float, float]  #: where s1 has an effect; both ends 0 for a preshape without posture
     s1_range: tuple[float, float]  #: range of s1 in the thesis preset
     s1_tries: tuple[float, ...]  #: values that the search of default poses tries
+    further: tuple[Array, ...] = ()  #: of further amplitudes s2, s3, ..: (f, j) each, as `posture`
+    further_ranges: tuple[tuple[float, float], ...] = ()  #: their ranges
+
+
+class HandModel(NamedTuple):
+    """The model that a hand was read from, with the names and frames by which other programs know its parts."""
+
+    file: str  #: its path, as it was given
+    body: str  #: the palm's body
+    in_body: Array  #: (3, 4) palm frame in the frame of that body
+    in_root: Array  #: (3, 4) palm frame in the frame of the model's file
+    joints: tuple[str, ...]  #: all joints that turn or slide, in the order of the model
+    rest: tuple[float, ...]  #: where those are that no finger moves [rad or m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +68,9 @@ class Hand:
     joint_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index_distal"; "" for one that does not move
     preshapes: Mapping[str, Preshape] = field(repr=False)  #: grasp types; the first one is the default
     finger_force: float = 8.0  #: what a stretched finger can exert at its tip [N]; the check by physics takes it
+    model: HandModel | None = field(
+        default=None, repr=False
+    )  #: where the hand was read from; None for the built-in ones
 
     @property
     def palm(self) -> int:

@@ -6,12 +6,13 @@
 Every joint moves at a constant rate and stays within its range: q(t) = clamp(start + s1 posture + t rate).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import unknown_name
+from surehold.errors import InputError, unknown_name
 from surehold.grasping.hand.model import Hand, Preshape
 
 __all__ = ["ClosingMotion", "closing_motion", "preshape_of"]
@@ -47,13 +48,21 @@ def preshape_of(hand: Hand, name: str | None = None) -> Preshape:
     return hand.preshapes[name]
 
 
-def closing_motion(hand: Hand, s1: float = 0.0, preshape: str | None = None) -> ClosingMotion:
+def closing_motion(hand: Hand, s1: float | Sequence[float] = 0.0, preshape: str | None = None) -> ClosingMotion:
     """Return the closing motion of a preshape, the hand's first one if none is named, with posture s1.
+
+    Of a preshape with further amplitudes, `s1` may be all of them: (s1, s2, ..).
 
     Raises
     ------
     InputError
-        If the hand has no preshape of that name.
+        If the hand has no preshape of that name, or the preshape has fewer amplitudes.
     """
     chosen = preshape_of(hand, preshape)
-    return ClosingMotion(chosen.start + s1 * chosen.posture, chosen.rate, hand.lower, hand.upper)
+    first, *others = (s1,) if isinstance(s1, int | float) else s1
+    if len(others) > len(chosen.further):
+        raise InputError(f"{len(others) + 1} amplitudes are given; the preshape has {len(chosen.further) + 1}.")
+    start = chosen.start + first * chosen.posture
+    for amplitude, component in zip(others, chosen.further, strict=False):
+        start = start + amplitude * component
+    return ClosingMotion(start, chosen.rate, hand.lower, hand.upper)

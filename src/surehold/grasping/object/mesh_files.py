@@ -44,6 +44,7 @@ def load_mesh(
     mass: float | None = None,
     frame: str = "auto",
     friction: float = 0.5,
+    scale: float = 1.0,
 ) -> LoadedMesh:
     """Read a mesh as an object to grasp; its frame is that of the file, in meters.
 
@@ -59,6 +60,8 @@ def load_mesh(
         Axes of the object's box: "file", "principal" or "auto", see above. In glTF y is up.
     friction
         Coefficient of friction with the hand.
+    scale
+        By which the coordinates are multiplied besides.
 
     Raises
     ------
@@ -80,8 +83,10 @@ def load_mesh(
         raise unknown_name("frame", frame, BOX_FRAMES)
     if mass is not None and not (np.isfinite(mass) and 0.0 < mass <= 100.0):
         raise InputError(f"mass is {mass!r}; give kilograms above 0 and up to 100.")
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise InputError(f"scale of {file.name!r} is {scale!r}; give a positive number.")
     vertices, faces, notes = read_mesh(file, kind)
-    vertices, faces, more = repaired(file.name, vertices * UNITS[unit], faces, unit)
+    vertices, faces, more = repaired(file.name, vertices * (UNITS[unit] * scale), faces, unit)
     notes += more
     volume, center, moments = _volume_integrals(vertices, faces)
     if volume < 1e-10:  # 0.1 ml: less is a sheet folded on itself

@@ -27,7 +27,7 @@ def described_grasp(
     """
     given = checked_words(words)
     body = obj or described_object(given)[0]
-    hand = described_hand(given["hand"], given["hand_config"])
+    hand = described_hand(given["hand"], given["hand_config"], given["preshape"] or "")
     # A command line says every option: what has its default does not contradict a preset.
     unsaid = {name for name in THESIS_SIMULATOR if given[name] == OPTIONS[name].default}
     options: Any = {name: given[name] for name in GraspOptions.__annotations__ if name not in unsaid}
@@ -66,14 +66,21 @@ def described_object(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
     return loaded.object, loaded.diagnosis
 
 
-def described_hand(name: str, config: str) -> Hand:
+def described_hand(name: str, config: str, preshape: str = "") -> Hand:
     """Return the hand of a name or of a model file with its description.
+
+    A preshape that is a synergy file is added to the hand's, under the name of the file as it is given.
 
     Raises
     ------
     InputError
         If the hand is unknown, a file is refused, or one of model and description is missing.
     """
+    if Path(preshape).suffix.lower() in (".yaml", ".yml"):
+        from surehold.grasping.hand.learned_synergy import read_synergy, with_synergy
+
+        synergy = read_synergy(preshape)
+        return with_synergy(described_hand(name, config), synergy, preshape)
     if not Path(name).suffix:
         if config:
             raise InputError(f"hand-config describes a model file; give that as the hand, not '{name}'.")

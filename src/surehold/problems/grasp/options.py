@@ -15,7 +15,16 @@ from surehold.errors import unknown_name
 from surehold.grasping.choices import CLOSING_MODES, COLLISIONS, CONES, CONTACT_MODELS, QUALITIES
 from surehold.grasping.hand.model import Hand
 
-__all__ = ["OPTIONS", "THESIS_SIMULATOR", "VARIABLES", "DescribedGrasp", "GraspOption", "GraspOptions", "checked_words"]
+__all__ = [
+    "AMPLITUDES",
+    "OPTIONS",
+    "THESIS_SIMULATOR",
+    "VARIABLES",
+    "DescribedGrasp",
+    "GraspOption",
+    "GraspOptions",
+    "checked_words",
+]
 
 #: All variables of a grasp, and their units.
 VARIABLES: Final[Mapping[str, str]] = {
@@ -27,6 +36,9 @@ VARIABLES: Final[Mapping[str, str]] = {
     "rz": "rad",
     "s1": "rad",
 }
+
+#: Further amplitudes of a synergy that was learned with more than two components, and their units.
+AMPLITUDES: Final[Mapping[str, str]] = {"s2": "rad", "s3": "rad"}
 
 #: What the preset "thesis" sets: the simulator behind the thesis. `s1` then ranges within +-pi.
 THESIS_SIMULATOR: Final = {
@@ -71,7 +83,9 @@ class GraspOptions(TypedDict, total=False):
         str | Hand,
         GraspOption("icub-left", "icub-left, icub-right, shadow, panda, or a model file (.xml of MuJoCo, .urdf)."),
     ]
-    preshape: Annotated[str | None, GraspOption("", "Type of grasp: power, tripod or pinch for the iCub.")]
+    preshape: Annotated[
+        str | None, GraspOption("", "Type of grasp: power, tripod or pinch for the iCub, or a synergy file (.yaml).")
+    ]
     closing: Annotated[
         str,
         GraspOption(

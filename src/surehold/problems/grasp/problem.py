@@ -4,6 +4,7 @@
                  the object [m]
     rx, ry, rz   turns about the hand's grasp center, R = R_default Rx Ry Rz [rad]
     s1           posture: opposition of the thumb [rad]
+    s2, s3       further amplitudes of a synergy that was learned with more than two components [rad]
     h, b, w      half extents of the object's box across the facet, along the fingers, and along the palm's y [m]
 
 Bounds (after the published grasp experiments): dx within ±(b + 25 mm), dy within ±w, the distance of the grasp center
@@ -26,10 +27,12 @@ from surehold.grasping.poses import Pose, default_pose, facet_axes
 from surehold.grasping.simulator import Simulator
 from surehold.optimization.box import Box
 from surehold.problems.grasp.default_poses import GraspDefault, default_facet, grasp_default
-from surehold.problems.grasp.options import OPTIONS, THESIS_SIMULATOR, VARIABLES, GraspOptions
+from surehold.problems.grasp.options import AMPLITUDES, OPTIONS, THESIS_SIMULATOR, VARIABLES, GraspOptions
 from surehold.problems.problem import checked_points
 
 __all__ = ["GraspProblem"]
+
+_KNOWN: Final = {**VARIABLES, **AMPLITUDES}
 
 
 class GraspProblem:
@@ -88,8 +91,8 @@ class GraspProblem:
         preset, bounds, fixed = given.pop("preset"), given.pop("bounds") or {}, given.pop("fixed") or {}
         names = (variables,) if isinstance(variables, str) else tuple(variables)
         for name in [*names, *bounds, *fixed]:
-            if name not in VARIABLES:
-                raise unknown_name("variable", name, VARIABLES)
+            if name not in _KNOWN:
+                raise unknown_name("variable", name, _KNOWN)
         if len(set(names)) != len(names) or not names:
             raise InputError(f"variables are {names}; name one or more of {', '.join(VARIABLES)}, each once.")
         for name in bounds:
@@ -99,7 +102,7 @@ class GraspProblem:
             if name in names:
                 raise InputError(f"'{name}' is both free and fixed; take it out of one of the two.")
             if not np.isfinite(value):
-                raise InputError(f"'{name}' is fixed at {value!r}; give a finite number in {VARIABLES[name]}.")
+                raise InputError(f"'{name}' is fixed at {value!r}; give a finite number in {_KNOWN[name]}.")
         body = shipped_object(obj) if isinstance(obj, str) else obj
         facet = facet or default_facet(body)
         axes = facet_axes(facet)
@@ -123,14 +126,21 @@ class GraspProblem:
         self._s1_range = chosen.s1_range if preset else chosen.s1_useful
         self.default: Final[GraspDefault] = grasp_default(self.simulator, facet, progress)
         self._fixed: dict[str, float] = dict.fromkeys(VARIABLES, 0.0) | {"s1": self.default.s1} | dict(fixed)
+        self._further = dict(zip(AMPLITUDES, chosen.further_ranges, strict=False))
         if "s1" in names and "s1" not in bounds and self._s1_range[0] >= self._s1_range[1]:
             raise InputError(
                 f"the preshape '{self._simulator.preshape}' of hand '{self._simulator.hand.name}' has no posture "
                 "variable; take s1 out of the variables."
             )
+        for name in AMPLITUDES:
+            if name in {*names, *fixed} and name not in self._further:
+                raise InputError(
+                    f"the preshape '{self._simulator.preshape}' of hand '{self._simulator.hand.name}' has no amplitude "
+                    f"{name}; take it out, or learn a synergy of more components."
+                )
         limits = self._limits(np.abs(axes.T) @ body.box_half_extents) | dict(bounds)
         self.box: Final[Box] = Box({name: limits[name] for name in names})
-        self.units: Final[tuple[str, ...]] = tuple(VARIABLES[name] for name in names)
+        self.units: Final[tuple[str, ...]] = tuple(_KNOWN[name] for name in names)
 
     @property
     def simulator(self) -> Simulator:
@@ -147,14 +157,14 @@ class GraspProblem:
         """Return the pose of the palm in the object's frame at x (d,)."""
         return self._pose(self._values(self._one(x)))
 
-    def posture(self, x: ArrayLike) -> float:
-        """Return the posture variable s1 at x (d,) [rad]."""
-        return self._values(self._one(x))["s1"]
+    def posture(self, x: ArrayLike) -> float | tuple[float, ...]:
+        """Return the posture variable s1 at x (d,) [rad]; all amplitudes of a preshape that has several."""
+        return self._posture(self._values(self._one(x)))
 
     def grasp(self, x: ArrayLike) -> Grasp:
         """Return the whole outcome of the trial at x (d,)."""
         values = self._values(self._one(x))
-        return self.simulator.grasp(self._pose(values), values["s1"])
+        return self.simulator.grasp(self._pose(values), self._posture(values))
 
     def __call__(self, x: ArrayLike) -> float | NDArray[np.float64]:
         """Return the quality at x (d,) as a float, or the qualities at x (n, d) as an array (n,)."""
@@ -169,11 +179,12 @@ class GraspProblem:
         """
         values = self._values(self._one(x))
         if not self.object.draws:
-            return np.array([self.simulator.grasp(self._pose(values), values["s1"]).quality])
+            return np.array([self.simulator.grasp(self._pose(values), self._posture(values)).quality])
         if self._others is None:
             self._others = tuple(self._build(draw) for draw in self.object.draws)
         pose = self._pose(values)
-        return np.array([simulator.grasp(pose, values["s1"]).quality for simulator in self._others])
+        posture = self._posture(values)
+        return np.array([simulator.grasp(pose, posture).quality for simulator in self._others])
 
     def on(self, obj: GraspObject) -> "GraspProblem":
         """Return the problem with the same poses and settings, with another object in the place of this one."""
@@ -196,6 +207,11 @@ class GraspProblem:
         offsets = [values[name] for name in ("dx", "dy", "dz", "rx", "ry", "rz")]
         return default_pose(self.simulator.hand, self._placed, self.facet, self.default.standoff, offsets)
 
+    def _posture(self, values: dict[str, float]) -> float | tuple[float, ...]:
+        if not self._further:
+            return values["s1"]
+        return (values["s1"], *(values.get(name, 0.0) for name in self._further))
+
     def _values(self, x: NDArray[np.float64]) -> dict[str, float]:
         return self._fixed | self.box.as_dict(x)
 
@@ -212,6 +228,7 @@ class GraspProblem:
             "ry": (-quarter, quarter),
             "rz": (-quarter, quarter),
             "s1": self._s1_range,
+            **self._further,
         }
 
     def _build(self, obj: GraspObject | None = None) -> Simulator:

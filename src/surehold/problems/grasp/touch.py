@@ -44,7 +44,7 @@ class Touch:
     observations: Observations  #: of the shape, in the object's frame
 
 
-def touch_trial(simulator: Simulator, pose: Pose, s1: float, probe: bool = False) -> Touch:
+def touch_trial(simulator: Simulator, pose: Pose, s1: float | tuple[float, ...], probe: bool = False) -> Touch:
     """Close a hand on the object of a simulator, and feel it; `pose` is relative to the object."""
     motion = closing_motion(simulator.hand, s1, simulator.preshape)
     opened = motion.joints(0.0)

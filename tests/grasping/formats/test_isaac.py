@@ -1,6 +1,7 @@
 """Isaac grasp files and plain dictionaries."""
 
 import json
+import os
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,7 +10,14 @@ import pytest
 import yaml
 
 from surehold.errors import InputError
-from surehold.grasping.formats import StoredGrasp, grasp_to_dict, read_isaac_grasps, write_isaac_grasps
+from surehold.grasping.formats import (
+    GraspFile,
+    StoredGrasp,
+    grasp_to_dict,
+    read_isaac_grasps,
+    write_isaac_grasps,
+)
+from surehold.grasping.formats.isaac import write_isaac_file
 from surehold.grasping.wrench.wrench_space import wrench_quality
 
 HEADER = "format: isaac_grasp\nformat_version: 1.0\nobject_frame: mug\ngripper_frame: hand\n"
@@ -111,7 +119,7 @@ def test_unreadable_and_unwritable_places(tmp_path):
     (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00\x80")
     with pytest.raises(InputError, match="UTF-8"):
         read_isaac_grasps(tmp_path / "binary.yaml")
-    with pytest.raises(InputError, match="cannot write"):
+    with pytest.raises(InputError, match="cannot be written"):
         write_isaac_grasps(tmp_path / "no folder" / "x.yaml", [], "mug", "hand")
 
 
@@ -165,3 +173,42 @@ def test_a_quality_is_stored_without_its_wrenches():
     assert data["epsilon"] == quality.epsilon
     assert data["weakest"] == quality.weakest.tolist()
     assert "wrenches" not in data
+
+
+def test_what_is_said_of_object_gripper_and_options_comes_back(tmp_path):
+    grasp = StoredGrasp("g", 0.5, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), {"a": 1.0}, {"a": 0.0}, {}, -0.7, 0.123)
+    told = GraspFile("mug", "palm", (grasp,), "mug.obj", 0.001, "hand.xml", ("l", "r"), "upper", {"object": "mug"})
+    write_isaac_file(tmp_path / "g.yaml", told)
+    assert read_isaac_grasps(tmp_path / "g.yaml") == told
+    raw = yaml.safe_load((tmp_path / "g.yaml").read_text())
+    assert isinstance(raw["format_version"], float), "Isaac Sim takes the difference from 1.0"
+    assert {"object_file", "object_scale", "gripper_file", "finger_colliders", "open_limit"} <= set(raw)
+
+
+def test_the_file_of_another_generator_is_read(tmp_path):
+    text = PUBLISHED.replace("1.0\n", '"1.0"\n', 1).replace("    confidence: 1.0\n", "")
+    (tmp_path / "g.yaml").write_text("created_with: grasp_guess\nobject_scale: 0.5\nbite_body_idx: 3\n" + text)
+    file = read_isaac_grasps(tmp_path / "g.yaml")
+    assert (file.object_scale, file.grasps[0].confidence, file.grasps[0].quality) == (0.5, 1.0, None)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("object_scale: 0\n", "object_scale is 0.0"),
+        ("object_scale: x\n", "object_scale must be a number"),
+        ("object_file: [1]\n", "object_file must be a text"),
+        ("finger_colliders: a\n", "finger_colliders must be a list"),
+        ("surehold: 1\n", "surehold a mapping"),
+    ],
+)
+def test_what_is_said_beside_the_grasps_is_checked(tmp_path, text, words):
+    (tmp_path / "g.yaml").write_text(text + grasp_text())
+    with pytest.raises(InputError, match=words):
+        read_isaac_grasps(tmp_path / "g.yaml")
+
+
+def test_a_pipe_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    with pytest.raises(InputError, match="no regular file"):
+        read_isaac_grasps(tmp_path / "pipe.yaml")

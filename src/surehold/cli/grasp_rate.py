@@ -1,0 +1,106 @@
+"""`surehold grasp rate FILE`: close the hand again in the grasps of a file, and rate them."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
+from surehold.cli.options import Seed
+
+__all__ = ["Formats", "grasp_rate"]
+
+Formats = Annotated[
+    str,
+    typer.Option(
+        "--format",
+        help="Formats in which the grasps are written: isaac (always), graspgen, dexgraspbench; several by commas.",
+    ),
+]
+_UNUSED = ("facet", "variables", "cloud", "camera", "normals", "contacts", "cloud_noise", "prior", "shapes")
+
+
+def _grasp_rate(
+    file: Annotated[
+        Path, typer.Argument(help="A file of grasps: .yaml (Isaac), .json (GraspGen), .npy or a folder of them.")
+    ],
+    obj: Annotated[
+        str, typer.Option("--object", help="The object, instead of the one that the file names.", show_default=False)
+    ] = "",
+    samples: Annotated[
+        int, typer.Option(help="Also rate each grasp in so many poses that are off by up to 10 mm and 5 degrees.")
+    ] = 0,
+    seed: Seed = 0,
+    check: Annotated[bool, typer.Option("--check", help="Shake the grasps, by physics (MuJoCo).")] = False,
+    formats: Formats = "isaac",
+    out: Annotated[
+        str, typer.Option(help="Folder into which the grasps are written as they are now.", show_default=False)
+    ] = "",
+    **options: Any,
+) -> None:
+    """Close the hand again in the grasps of a file, and rate them."""
+    from rich.table import Table
+
+    from surehold.cli.compilation import announced
+    from surehold.cli.grasp import checked
+    from surehold.cli.terminal import terminal
+    from surehold.grasping.formats.gripper import stored_grasp
+    from surehold.grasping.formats.writing import checked_formats, write_grasps
+    from surehold.grasping.rating import rated_grasps
+    from surehold.problems.grasp.stored import described_file, described_simulator, stored_words
+    from surehold.store.atomic import checked_folder
+
+    chosen = checked_formats(formats.split(","))
+    if out:
+        checked_folder(out)
+    console = terminal()
+    content, words, hand, found = described_file(file, {"object": obj, **options})
+    body = object_of(words, console) if found is None else found
+
+    def build(gripper: Any) -> Any:
+        return described_simulator(words, body, gripper)
+
+    rated = []
+    with announced(console), shown_progress("grasps", console) as progress:
+        simulator = described_simulator(words, body, hand)
+        try:
+            for one in rated_grasps(simulator, content, build, samples, seed):
+                rated.append(one)
+                progress(len(rated) / len(content.grasps))
+        except KeyboardInterrupt:
+            if not rated:
+                raise
+            console.print(f"Interrupted: {len(rated)} of {len(content.grasps)} grasps are rated.", soft_wrap=True)
+    table = Table(title=None, show_edge=False, pad_edge=False, header_style="bold")
+    columns = ["grasp", "confidence", "before", "status", "quality"]
+    for column in columns + (["off: mean", "closed"] if samples else []) + (["physics"] if check else []):
+        table.add_column(column, overflow="fold", min_width=len(column))
+    stored = []
+    for one in rated:
+        before = "" if one.stored.quality is None else f"{one.stored.quality:.3f}"
+        row = [one.stored.name, f"{one.stored.confidence:.2f}", before, one.grasp.status]
+        row.append(f"{one.grasp.quality:.3f}")
+        if one.robust is not None:
+            row += [f"{one.robust.mean:.3f}", f"{100 * one.robust.closure_rate:.0f} %"]
+        if check:
+            from surehold.grasping.physics.check import GraspChecker
+
+            row.append(checked(GraspChecker(one.simulator).check(one.grasp), console))
+        table.add_row(*row)
+        preshape = one.simulator.hand.preshapes[one.simulator.preshape]
+        worth = one.grasp.quality if one.robust is None else one.robust.mean
+        stored.append(stored_grasp(hand, one.grasp, preshape, one.stored.name, worth))
+    console.print(
+        f"{file}: {len(rated)} grasps of hand {hand.name} on {body.name}, {simulator.quality} with "
+        f"{simulator.contact} contacts and friction {simulator.friction:g}.",
+        markup=False,
+        soft_wrap=True,
+    )
+    console.print(table)
+    if out:
+        preshape = simulator.hand.preshapes[simulator.preshape]
+        for path in write_grasps(out, stored, body, hand, preshape, chosen, stored_words(words)):
+            console.print(f"written: {path}", markup=False, soft_wrap=True)
+
+
+grasp_rate = takes_grasp_options(_grasp_rate, _UNUSED)

@@ -1,0 +1,75 @@
+"""Recorded postures of a hand: a CSV file with a column for each joint and a row for each posture.
+
+    index_1,index_2,thumb_1,grasp
+    0.42,0.61,0.80,power
+    0.10,0.22,0.95,pinch
+
+The order of the columns does not matter, and joints that do not move may be missing. A column `grasp` names the grasps.
+Angles are in radians, or in degrees if it is said; shifts of sliding joints are in meters.
+"""
+
+import csv
+import io
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError
+from surehold.grasping.plain_data import regular_bytes
+
+__all__ = ["Postures", "read_postures"]
+
+_LABEL: Final = "grasp"
+_MOST_COLUMNS: Final = 200
+
+
+class Postures(NamedTuple):
+    """Postures of a hand."""
+
+    joints: tuple[str, ...]  #: (j,)
+    angles: NDArray[np.float64]  #: (n, j) rad or m
+    grasps: tuple[str, ...]  #: (n,) names; empty without such a column
+
+
+def read_postures(path: str | Path, degrees: bool = False) -> Postures:
+    """Read recorded postures.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a joint is given twice, a row is too short or too long, or an entry is no finite
+        number; the message names row and column.
+    """
+    where = str(path)
+    try:
+        text = regular_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{where!r} is not a text file in UTF-8; give a CSV file.") from None
+    separator = ";" if ";" in text.partition("\n")[0] else ","
+    try:
+        rows = [row for row in csv.reader(io.StringIO(text), delimiter=separator) if row]
+    except csv.Error as error:
+        raise InputError(f"{where!r} is no CSV file: {error}.") from None
+    names = [name.strip() for name in rows[0]] if rows else []
+    joints = [name for name in names if name != _LABEL]
+    if not joints or len(names) > _MOST_COLUMNS or len(set(names)) != len(names) or "" in names:
+        raise InputError(f"{where!r}: its first row must name up to {_MOST_COLUMNS} joints, each once.")
+    angles, grasps = np.empty((len(rows) - 1, len(joints))), []
+    for i, row in enumerate(rows[1:]):
+        if len(row) != len(names):
+            raise InputError(f"{where!r}, row {i + 2} has {len(row)} entries; the first row names {len(names)}.")
+        k = 0
+        for name, entry in zip(names, row, strict=True):
+            if name == _LABEL:
+                grasps.append(entry.strip())
+                continue
+            try:
+                angles[i, k] = float(entry)
+            except ValueError:
+                angles[i, k] = np.nan
+            if not np.isfinite(angles[i, k]):
+                raise InputError(f"{where!r}, row {i + 2}, {name}: {entry[:40]!r} is no finite number.")
+            k += 1
+    return Postures(tuple(joints), np.radians(angles) if degrees else angles, tuple(grasps))

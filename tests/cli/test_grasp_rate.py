@@ -1,0 +1,108 @@
+"""`surehold grasp rate`: a run's grasps of every format are rated again, and what does not fit is one line."""
+
+import json
+from copy import deepcopy
+
+import pytest
+import trimesh
+import yaml
+
+from surehold.cli import run
+from surehold.grasping import Simulator
+from surehold.grasping.formats import read_grasps
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def block(here):
+    """Return a folder with the grasps of a run on a mesh, in every format."""
+    trimesh.creation.box((0.05, 0.05, 0.12)).export("block.stl")
+    line = "grasp block.stl --unit m --mass 0.2 --friction 0.8 --trials 3 --initial 3 --noise none --method bo"
+    assert run([*line.split(), "--format", "graspgen,dexgraspbench", "--out", "held"]) == 0
+    return here / "held"
+
+
+def rated(line, capsys):
+    capsys.readouterr()
+    assert run(["grasp", "rate", *line.split()]) == 0
+    return " ".join(capsys.readouterr().out.split())
+
+
+def test_a_run_is_rated_as_it_was(block, capsys):
+    (found,) = json.loads((block / "grasps.json").read_text()).values()
+    quality = found["grasp"]["quality"]
+    text = rated("held/grasps.yaml", capsys)
+    assert "on block, epsilon with graded contacts and friction 0.8" in text
+    assert text.count(f"{quality:.3f}") == 2, "before and now"
+    (block.parent / "block.stl").unlink()
+    assert f"{quality:.3f}" in rated("held/grasps.yaml", capsys), "the mesh beside the file is taken"
+    text = rated("held/graspgen.json --friction 0.8 --mass 0.2 --samples 4", capsys)
+    assert f"{quality:.3f}" in text
+    assert "off: mean" in text
+    assert f"{quality:.3f}" in rated("held/dexgraspbench/grasps --friction 0.8 --mass 0.2", capsys)
+    assert "friction 0.3" in rated("held/grasps.yaml --friction 0.3", capsys)
+
+
+def test_rated_grasps_are_written_in_another_format(block, capsys):
+    rated("held/grasps.yaml --out again --format graspgen", capsys)
+    before, now = read_grasps(block / "grasps.yaml"), read_grasps(block.parent / "again" / "grasps.yaml")
+    assert [g.position for g in now.grasps] == [pytest.approx(g.position, abs=1e-12) for g in before.grasps]
+    assert now.settings == before.settings
+    assert (block.parent / "again" / "graspgen.json").exists()
+
+
+def changed(block, change):
+    content = yaml.safe_load((block / "grasps.yaml").read_text())
+    change(content)
+    (block / "grasps.yaml").write_text(yaml.safe_dump(content))
+
+
+@pytest.mark.parametrize(
+    ("change", "line", "words"),
+    [
+        (lambda c: c.update(format_version=2.0), "", "has format_version '2.0'; version 1.0 is supported"),
+        (lambda c: c["surehold"].update(tool="rm"), "", "surehold.tool is none of object, unit"),
+        (lambda c: c["surehold"].update(friction="x"), "", "friction is 'x'; it must be a number"),
+        (lambda c: c["surehold"].update(hand=["x"]), "", "it must be a text"),
+        (lambda c: c["surehold"].update(contact="x"), "", "contact model 'x' is unknown"),
+        (lambda c: c.update(object_file="../../elsewhere.obj", surehold={}), "", "is not beside it"),
+        (lambda c: c.update(object_file="", surehold={}), "", "names no object; give one with --object"),
+        (lambda c: None, "--object nothing", "object 'nothing' is unknown"),
+        (lambda c: None, "--format step", "isaac, graspgen, dexgraspbench"),
+        (lambda c: None, "--samples -1", "number of disturbed trials is -1"),
+    ],
+)
+def test_what_does_not_fit_is_one_line(block, capsys, change, line, words):
+    changed(block, change)
+    capsys.readouterr()
+    assert run(["grasp", "rate", "held/grasps.yaml", *line.split()]) == 2
+    captured = capsys.readouterr()
+    assert words in " ".join(captured.err.split())
+    assert captured.err.count("error:") == 1
+
+
+def test_a_file_that_is_none(here, capsys):
+    assert run(["grasp", "rate", "nothing.yaml"]) == 2
+    assert "cannot read 'nothing.yaml'" in capsys.readouterr().err
+    assert run(["grasp", "mug", "--format", "step", "--out", "x"]) == 2
+    assert "format of grasps 'step' is unknown" in " ".join(capsys.readouterr().err.split())
+    assert not (here / "x").exists(), "said before the run"
+
+
+def test_what_was_rated_before_an_interruption_is_said(block, capsys, monkeypatch):
+    changed(block, lambda c: c["grasps"].update(second=deepcopy(next(iter(c["grasps"].values())))))
+    grasp, closed = Simulator.grasp, []
+
+    def interrupted(self, pose, s1=0.0):
+        closed.append(pose)
+        if len(closed) == 2:
+            raise KeyboardInterrupt
+        return grasp(self, pose, s1)
+
+    monkeypatch.setattr(Simulator, "grasp", interrupted)
+    assert "Interrupted: 1 of 2 grasps are rated." in rated("held/grasps.yaml", capsys)
