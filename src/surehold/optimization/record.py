@@ -73,6 +73,11 @@ class Record(ABC):
         return {limit.name: self._trials.outputs[:, k] for k, limit in enumerate(self._trials.limits)}
 
     @property
+    def limits(self) -> tuple[Limit, ...]:
+        """Limits of the further outputs, in the order of `constraints`; those that are only watched are among them."""
+        return self._trials.limits
+
+    @property
     def reached(self) -> NDArray[np.float64]:
         """Inputs truly reached (t, d), in the box's units: the commanded ones where nothing else was told."""
         return self.box.from_unit(self._trials.reached)

@@ -88,6 +88,7 @@ class Requirements:
         self._seed: Final = seed
         self._limited: Final = tuple(k for k, limit in enumerate(limits) if not limit.watched)
         self._success: tuple[int, SuccessModel] | None = None
+        self._allowed: list[bool] = []
         self._cautious: Final[dict[int, tuple[int, Posterior]]] = {}
         self._models: Final = {k: self._model(GaussianProcess(noise=noise), k) for k in range(len(limits))}
 
@@ -97,6 +98,7 @@ class Requirements:
             model.forget()
         self._cautious.clear()
         self._success = None
+        self._allowed = []
 
     # --- which trials are feasible --------------------------------------------------------------------------------
 
@@ -116,9 +118,24 @@ class Requirements:
             found[known] = self._missed(told[known]).max(axis=1, initial=-np.inf) <= 0.0
         if not known.all() and self._limited:
             found[~known] = self.probability(trials, places[~known])
-        if self.region is not None and len(trials):
-            found[~self.region.contains(places)] = 0.0
+        found[~self._allowed_at(trials)] = 0.0
+        if self.safety is not None and self._unmeasured(trials):
+            found[:] = 0.0
         return found
+
+    def _allowed_at(self, trials: Trials) -> NDArray[np.bool_]:
+        """Tell where trials were made at allowed inputs, (t,): asked once of each, for a function may take its time."""
+        if self.region is None:
+            return np.ones(len(trials), dtype=bool)
+        new = trials.places[len(self._allowed) :]
+        if len(new):
+            self._allowed += self.region.contains(new).tolist()
+        return np.array(self._allowed, dtype=bool)
+
+    def _unmeasured(self, trials: Trials) -> list[str]:
+        """Return the names of limited outputs that no trial has measured."""
+        measured = self._measured(trials)
+        return [self.limits[k].name for k in self._limited if k not in measured]
 
     def feasible(self, trials: Trials) -> NDArray[np.bool_]:
         """Tell which trials may become the answer, (t,)."""
@@ -139,6 +156,9 @@ class Requirements:
 
     def shortfall(self, trials: Trials) -> str:
         """Return in words that nothing feasible is known, and what came nearest; empty where something is."""
+        if unmeasured := self._unmeasured(trials):
+            names = " and ".join(unmeasured)
+            return f"none of {len(trials)} trials has measured {names}: whether limits are kept there is not known."
         if self.feasible(trials).any():
             return ""
         told = trials.outputs[:, list(self._limited)]
@@ -164,7 +184,7 @@ class Requirements:
         Raises InputError if no allowed trial has given a value.
         """
         share = np.where(trials.eligible, self.feasibility(trials), -1.0)
-        if self.region is not None and not (trials.eligible & self.region.contains(trials.places)).any():
+        if not (trials.eligible & self._allowed_at(trials)).any():
             raise InputError("no trial at an allowed input has given a value yet; ask for one, and tell its outcome.")
         best = share >= share.max() - 1e-12
         if best.sum() > 1:  # all certainly infeasible: the one that misses least
@@ -184,6 +204,8 @@ class Requirements:
             share = float(self.feasibility(trials)[tried].max())
         else:
             share = float(execution_probability(self._outputs(trials), reached, u[None, :])[0])
+        if self._unmeasured(trials):  # nothing is known: no promise is made
+            share = 0.0
         highest = int(np.nanargmax(trials.values))
         refused = answer.refused
         if not self.feasible(trials)[highest]:
@@ -197,7 +219,7 @@ class Requirements:
         parts = [f"{self.limits[i].name} by {m:.3g}" for i, m in zip(self._limited, missed, strict=True) if m > 0.0]
         if parts:
             return f"{start}missed {' and '.join(parts)}."
-        if self.region is not None and not self.region.contains(trials.places[k : k + 1])[0]:
+        if not self._allowed_at(trials)[k]:
             return f"{start}is not allowed."
         if not self._limited:
             return f"{start}reached a place outside of the box."
