@@ -188,8 +188,9 @@ def maximize(
     f
         Takes x (d,) in the box's units, or a dictionary {name: value} where the box has logarithms, whole numbers or
         choices; returns a number, with `constraints` a number and a dictionary of the further outputs,
-        (y, {"torque": 3.1}); outputs that `constraints` does not name are kept with the trial and not modelled. A trial
-        that raises, or gives anything but one finite number, is recorded as failed and the run goes on. With `outcome="success"` it returns True or False.
+        (y, {"torque": 3.1}); outputs that `constraints` does not name are kept with the trial, unmodelled. A trial
+        that raises, or gives anything but one finite number, is recorded as failed and the run goes on. With
+        `outcome="success"` it returns True or False.
     n_trials
         Budget, initial design included.
     callback

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from surehold.defaults import ANCHORS, APART, SUCCESS_SHARE
+from surehold.defaults import ANCHORS, APART, FAILURE_POWER, SUCCESS_SHARE
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.admission import Admission, Likelihood, Requirement
@@ -57,7 +57,7 @@ class Requirements:
     noise
         Observation noise of the outputs: "none" or "inferred".
     failures
-        Whether it is learnt where trials fail.
+        Up to how many trials it is learnt where they fail.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Requirements:
         noise: NoiseName,
         lattice: Lattice | None,
         seed: int,
-        failures: bool = False,
+        failures: float = 0,
     ):
         self.failures: Final = failures
         self.region: Final = region
@@ -147,8 +147,13 @@ class Requirements:
         found[found] = share >= min(self.level, SUCCESS_SHARE * share.max())
         return found
 
+    def model_failures(self, trials: Trials) -> bool:
+        """Tell whether failed trials teach where trials fail, and nothing of the response."""
+        successful = trials.successful
+        return len(trials) <= self.failures and bool(successful.any()) and not successful.all()
+
     def _where_it_fails(self, trials: Trials) -> SuccessModel | None:
-        if not self.failures or trials.successful.all():
+        if not self.model_failures(trials):
             return None
         if self._success is None or self._success[0] != len(trials):
             self._success = (len(trials), SuccessModel(trials.reached, trials.successful))
@@ -197,6 +202,8 @@ class Requirements:
         self, answer: Recommendation, trials: Trials, u: NDArray[np.float64], reached: Perturbations, sign: float
     ) -> Recommendation:
         """Return the answer at u (d,) with what is known of its outputs and of its feasibility."""
+        if self.region is None and not self.limits and not self.model_failures(trials):
+            return answer
         posteriors = self.posteriors(trials)
         outputs = {name: execution_at(posterior, reached, u) for name, posterior in posteriors.items()}
         tried = np.flatnonzero(trials.eligible & same(u, trials.places)) if self._ranking.exact_inputs else []
@@ -221,8 +228,14 @@ class Requirements:
             return f"{start}missed {' and '.join(parts)}."
         if not self._allowed_at(trials)[k]:
             return f"{start}is not allowed."
-        if not self._limited:
+        if not trials.eligible[k]:
             return f"{start}reached a place outside of the box."
+        if (model := self._where_it_fails(trials)) is not None and not self._ranking.exact_inputs:
+            share = float(
+                np.exp(Succeeds(model, self._ranking.accurate).log_probability(trials.places[k : k + 1])[0][0])
+            )
+            if share < self.level:
+                return f"{start}only {share:.0%} of its executions are expected to succeed."
         share = float(self.probability(trials, trials.places[k : k + 1])[0])
         return f"{start}only {share:.0%} of its executions are expected to keep all limits."
 
@@ -247,7 +260,7 @@ class Requirements:
             Within(posterior, limit, perturbations, float(ndtri(share))) for posterior, limit in outputs
         )
         if fails is not None:
-            within = (*within, Succeeds(fails, perturbations))
+            within = (*within, Succeeds(fails, perturbations, FAILURE_POWER))
         safety = self.safety
         if safety is None:
             return Admission(self.region, within)
@@ -276,14 +289,22 @@ class Requirements:
         logs = admission.log_probability(found)[0] + np.log(-np.expm1(-0.5 * (far / APART) ** 2) + 1e-300)
         return found[np.argsort(-logs, kind="stable")]
 
-    def strict(self, trials: Trials) -> Admission:
-        """Return what an answer has to respect that was never tried."""
-        outputs = self._outputs(trials)
+    def strict(self, trials: Trials) -> Admission | None:
+        """Return what an answer has to respect that was never tried; None for nothing."""
+        outputs, model = self._outputs(trials), self._where_it_fails(trials)
+        if self.region is None and not outputs and model is None:
+            return None
+        succeeds = None if model is None else Succeeds(model, self._ranking.accurate)
+        least = -np.inf
+        if succeeds is not None:
+            best = succeeds.log_probability(trials.places[trials.eligible])[0].max()
+            least = float(np.minimum(np.log(self.level), np.log(SUCCESS_SHARE) + best))
 
         def feasible(U: NDArray[np.float64]) -> NDArray[np.bool_]:
-            return execution_probability(outputs, self._ranking.accurate, U) >= self.level
+            found = execution_probability(outputs, self._ranking.accurate, U) >= self.level
+            return found if succeeds is None else found & (succeeds.log_probability(U)[0] >= least)
 
-        return Admission(self.region, (), feasible if outputs else None)
+        return Admission(self.region, (), feasible if outputs or succeeds is not None else None)
 
     def initial(self, design: NDArray[np.float64], first: NDArray[np.float64], rng: Any) -> NDArray[np.float64]:
         """Return an initial design (n, d) whose points are allowed; `first` (k, d) come before it."""
@@ -294,7 +315,9 @@ class Requirements:
         if self.safety is not None:
             return trials.places[int(np.argmax(np.where(trials.eligible, self.feasibility(trials), -1.0)))]
         points = np.concatenate([trials.places, trials.pending])
-        if self.failures and len(points):  # nothing has succeeded: where nothing has been tried
+        if (
+            self.failures and len(points) and not trials.successful.any()
+        ):  # nothing has succeeded: where nothing has been tried
             holes = largest_holes(points, rng, self.admission(trials))
             if len(holes):
                 return holes[0]
