@@ -88,7 +88,7 @@ def maximize(
     noise_text = defaults.noise if noise is None else noise
     input_noise = own_noise(problem) if noise_text == "own" else noise_of(noise_text, method)
 
-    from surehold.cli.session import Kept, folder_for, run_session
+    from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
     from surehold.optimization.optimizer import Optimizer
 
     kept = Kept(study, storage, {"function": problem} if ":" in problem else {"synthetic": problem})
@@ -96,7 +96,7 @@ def maximize(
     start = initial
     if start is None:
         start = min(defaults.initial or Optimizer.default_n_initial(chosen.box), budget)
-    run_session(
+    report = run_session(
         chosen,
         title=f"{direction.capitalize()} {chosen.name}",
         method=method,
@@ -114,6 +114,8 @@ def maximize(
         kept=kept,
         required=limits_given(constraint, allowed, feasible),
     )
+    if not report.succeeded:
+        raise typer.Exit(NO_SUCCESS)
 
 
 def defaults_of(problem: str) -> Defaults:

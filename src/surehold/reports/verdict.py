@@ -145,6 +145,13 @@ def _of_the_run(report: RunReport) -> Verdict:
 
 def _of_nothing(report: RunReport) -> Verdict:
     """Return the verdict where no trial succeeded: no winner among them."""
+    if report.infeasible:
+        return Verdict(
+            report.infeasible[:1].upper() + report.infeasible[1:],
+            f"The point shown comes nearest ({_trial(report.recommended)} of {report.y.size}) and is no answer: it does "
+            "not keep what was asked for. Widen the limits, or the box.",
+            False,
+        )
     counts = sorted(report.outcomes.items(), key=lambda item: -item[1])
     ended = "; ".join(f"{n} × {status}" for status, n in counts)
     limit = number(report.success_above)
