@@ -148,8 +148,8 @@ def _of_nothing(report: RunReport) -> Verdict:
     if report.infeasible:
         return Verdict(
             report.infeasible[:1].upper() + report.infeasible[1:],
-            f"The point shown ({_trial(report.recommended)} of {report.y.size}) comes nearest and is no answer. Widen the "
-            "limits, or the box.",
+            f"The point shown ({_trial(report.recommended)} of {report.y.size}) comes nearest and is no answer. "
+            "Widen the limits, or the box.",
             False,
         )
     counts = sorted(report.outcomes.items(), key=lambda item: -item[1])
