@@ -108,8 +108,8 @@ class Record(ABC):
         y
             One finite number.
         failed
-            True: the place gave nothing, and is avoided from then on, see `failures`. "rig": the place is not at fault (a
-            camera hung, a person came in the way). The trial leaves no trace, and its number is asked for again.
+            True: the place gave nothing, and is avoided from then on, see `failures`. "rig": the place is not at fault
+            (a camera hung, a person came in the way). The trial leaves no trace, and its number is asked for again.
         reached
             Where the trial truly was, (d,), where that is known; inside of the box or not. The model learns from
             there; more than 1e6 box widths away counts as 1e6. `recommend` answers inputs inside the box only.
