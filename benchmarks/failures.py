@@ -7,8 +7,11 @@ Problems (maximized, exact, known optima)
     edge      the optimum lies on the edge of failure: the value rises up to a line, beyond which every trial fails
     mostly    95 % of the box fail; inside the rest, a disc, a hill off its center
     chance    no place fails, but every trial does with probability 0.2
-Reported: evaluations until a trial is within 1 % of the optimum (of the range from the mean over the box to the
-optimum), the budget where it never is; and the median of the final regret in that unit.
+Reported: evaluations until a trial is within 1 % of the optimum (of the range from the mean over all places that can
+succeed to the optimum), the budget where it never is; and the median of the final regret in that unit. Beside both
+rules stands "none": what is needed where nothing fails, of which a better rule cannot need less.
+
+Constants were chosen on seeds from 100 on; the tables in the documentation are of seeds from 0 on.
 """
 
 import argparse
@@ -58,16 +61,16 @@ def scale(problem: Problem) -> tuple[float, float]:
     chance = problem is PROBLEMS["chance"]
     values = np.array([problem.value(x) for x in grid])
     good = np.array([chance or not problem.fails(x, rng) for x in grid])
-    return float(values[good].max()), float(values[good].max() - values.mean())
+    return float(values[good].max()), float(values[good].max() - values[good].mean())
 
 
 def run(problem: Problem, rule: str, seed: int) -> NDArray[np.float64]:
     """Return the best value after each trial."""
-    optimizer = sh.Optimizer(sh.Box.unit(2), seed=seed, failures=rule)
+    optimizer = sh.Optimizer(sh.Box.unit(2), seed=seed, failures="lowest" if rule == "none" else rule)
     rng = np.random.default_rng([seed, 1])
     for _ in range(problem.trials):
         x = optimizer.ask()
-        failed = problem.fails(x, rng)
+        failed = rule != "none" and problem.fails(x, rng)
         optimizer.tell(x, None if failed else problem.value(x), failed=bool(failed))
     return np.fmax.accumulate(optimizer.y)
 
@@ -82,7 +85,7 @@ def main() -> None:
     for name in arguments.problems:
         problem = PROBLEMS[name]
         best, width = scale(problem)
-        for rule in ("lowest", "modelled"):
+        for rule in (["none"] if name in ("beside", "chance") else []) + ["lowest", "modelled"]:
             curves = [
                 run(problem, rule, seed) for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
             ]

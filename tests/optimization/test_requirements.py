@@ -198,8 +198,8 @@ def test_a_whole_run_takes_outputs_and_survives_missing_ones():
     assert gramacy(result.X[result.best_index]) <= 0.0
     assert any(trial.outputs.get("c") == gramacy(trial.x) for trial in result.trials)
     for trial in result.trials:
-        assert ("says nothing about 'c'" in trial.failure) == (trial.x[0] >= 0.9)
-    with pytest.raises(SureholdError, match="says nothing about 'c'"):
+        assert ("returned nothing of 'c'; return (value," in trial.failure) == (trial.x[0] >= 0.9)
+    with pytest.raises(SureholdError, match="returned nothing of 'c'"):
         minimize(lambda x: x.sum(), BOX, 20, constraints={"c": (None, 0.0)})
 
 
@@ -225,3 +225,44 @@ def test_while_nothing_is_feasible_everything_promises():
     assert optimizer.promise() == np.inf
     with pytest.raises(InputError, match="torque"):
         optimizer.tell(optimizer.ask(), 1.0, constraints={"torque": 10**400})
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        ({"torqe": 1.0}, "output 'torqe' is unknown; did you mean 'torque'"),
+        ({"torque": np.nan}, "output 'torque' is nan"),
+        ({"torque": "three"}, "output 'torque' is 'three'"),
+    ],
+)
+def test_what_a_function_returns_wrongly_is_said(returned, message):
+    with pytest.raises(SureholdError, match=message):
+        minimize(lambda x: (x.sum(), returned), BOX, 12, constraints={"torque": (None, 1.0)})
+
+
+def test_outputs_that_nobody_asked_for_are_kept_with_the_trials():
+    pytest.importorskip("pandas")
+    result = minimize(lambda x: (x.sum(), {"torque": x[0], "best": 2.0}), BOX, 8, constraints={"torque": (None, 0.5)})
+    table = result.to_dataframe()
+    assert table["torque"].to_numpy() == pytest.approx(result.X[:, 0])
+    assert table["best"].tolist() == [2.0] * 8
+    assert table["feasible"].tolist() == (result.X[:, 0] <= 0.5).tolist()
+    assert set(result.optimizer.outputs) == {"torque"}
+    plain = minimize(lambda x: (x.sum(), {"seen": 1.0}), BOX, 7)
+    assert np.isfinite(plain.y).all()
+    assert plain.to_dataframe()["seen"].tolist() == [1.0] * 7
+
+
+def test_of_an_output_that_was_never_measured_nothing_is_promised():
+    optimizer = Optimizer(BOX, constraints={"torque": (None, 0.5)}, n_initial=3, seed=0)
+    for _ in range(5):
+        x = optimizer.ask()
+        optimizer.tell(x, float(x[0]), constraints={"torque": None})
+    best = optimizer.recommend()
+    assert best.feasible == 0.0
+    assert best.infeasible == "none of 5 trials has measured torque: whether limits are kept there is not known."
+    assert best.observed == optimizer.y.max()
+    safe = Optimizer(BOX, constraints={"torque": (None, 0.5)}, safety=0.9, initial_points=[[0.5, 0.5]])
+    safe.tell(safe.ask(), 1.0, constraints={"torque": None})
+    with pytest.raises(SureholdError, match="nothing is known to be safe: none of 1 trials has measured torque"):
+        safe.ask()

@@ -16,6 +16,7 @@ from surehold.studies.robot import RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.service import service
 from surehold.studies.settings import StudySettings
+from surehold.studies.stop_rule import StopRule
 from surehold.studies.trial_function import trial_function
 from surehold.studies.worker import work
 
@@ -78,6 +79,18 @@ def test_workers_store_outputs(study):
     assert work(study, function, most=3) == 3
     stored = [trial.user_attrs["surehold:outputs"] for trial in study.trials()]
     assert [set(outputs) for outputs in stored] == [{"torque", "temperature"}] * 3
+
+
+def test_a_worker_fails_what_the_study_cannot_take(study):
+    # It would be handed out again for ever.
+    study.set_stop_rule(StopRule(trials=3))
+    returned = iter([(1.0, {"temperature": 20.0}), (1.0, {"torqe": 2.0}), (1e200, {"torque": 2.0, "current": 3.0})])
+    seen = []
+    made = work(study, trial_function(lambda x: next(returned), SPACE), after=lambda _, outcome: seen.append(outcome))
+    assert made == 3
+    assert [trial.state.name for trial in study.trials()] == ["FAIL"] * 3
+    for outcome, message in zip(seen, ("returned nothing of 'torque'", "did you mean 'torque'", "1e+200"), strict=True):
+        assert message in outcome.failure
 
 
 def test_over_http(study):

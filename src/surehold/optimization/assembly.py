@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import DESIGN_LEAST, DESIGN_MOST, DESIGN_PER_VARIABLE, DESIGN_VARIABLES_PER_MORE
+from surehold.defaults import (
+    DESIGN_LEAST,
+    DESIGN_MOST,
+    DESIGN_PER_VARIABLE,
+    DESIGN_VARIABLES_PER_MORE,
+    FAILURES_MODELLED,
+)
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.argument_kinds import check_kinds
@@ -147,7 +153,7 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
             noise="inferred" if strategy.ranking.noisy and straying is None else "none",
             lattice=lattice,
             seed=seed,
-            failures=s.failures == "modelled",
+            failures=_failures_modelled(s),
         )
     rng = np.random.default_rng([seed, 0])
     rest = initial_design(s.design, max(n_initial - len(first), 1), box.dimension, rng)
@@ -177,10 +183,11 @@ def _check(s: SimpleNamespace) -> None:
         ("direction", ("maximize", "minimize")),
         ("outcome", ("value", "success")),
         ("conditions", ("commanded", "measured")),
-        ("failures", ("lowest", "modelled")),
+        ("failures", (None, "lowest", "modelled")),
     ):
         if getattr(s, name) not in known:
-            raise unknown_name("rule for failures" if name == "failures" else name, getattr(s, name), known)
+            shown = "rule for failures" if name == "failures" else name
+            raise unknown_name(shown, getattr(s, name), [choice for choice in known if choice is not None])
     if s.noise == "told" and (s.preset is not None or s.outcome == "success" or s.surrogate not in (None, *TELLABLE)):
         raise InputError(f"noise='told' needs one of the surrogates {', '.join(TELLABLE)}, and no preset.")
     for name in ("feasible", "safety"):
@@ -189,13 +196,20 @@ def _check(s: SimpleNamespace) -> None:
             raise InputError(f"{name} is {value!r}; give a probability strictly between 0 and 1, such as 0.95.")
 
 
+def _failures_modelled(s: SimpleNamespace) -> float:
+    """Return up to how many trials it is modelled which of them fail."""
+    if s.failures is None:
+        return 0 if s.preset is not None or s.outcome == "success" else FAILURES_MODELLED
+    return np.inf if s.failures == "modelled" else 0
+
+
 def _required(s: SimpleNamespace, region: Region | None, limits: tuple[Limit, ...], first: NDArray[np.float64]) -> bool:
     """Tell whether these settings require anything of trials and answers."""
     if s.safety is not None and (all(limit.watched for limit in limits) or not len(first)):
         raise InputError(
             "safety= needs constraints= with a limit, and initial_points= that are known to keep all limits."
         )
-    if region is None and not limits and s.failures == "lowest":
+    if region is None and not limits and not _failures_modelled(s):
         return False
     if s.preset is not None:
         raise InputError(

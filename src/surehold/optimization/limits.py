@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
 
-__all__ = ["Limit", "checked_outputs", "limits_of", "parsed_limit"]
+__all__ = ["Limit", "checked_outputs", "limits_of", "parsed_limit", "returned_outputs"]
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def checked_outputs(
                 f"Optimizer(constraints={{{name!r}: (None, 3.0)}}), or (None, None) to record it only."
             )
         if name not in names:
-            raise unknown_name("constraint", name, names)
+            raise unknown_name("output", name, names)
     found = []
     for limit in limits:
         if limit.name not in given and not failed and not limit.watched:
@@ -116,11 +116,33 @@ def checked_outputs(
         try:
             number = np.nan if value is None else _number(value)
         except (TypeError, ValueError, OverflowError):
-            raise InputError(f"constraint '{limit.name}' is {value!r}; give one finite number, or None.") from None
+            number = np.inf
         if value is not None and not np.isfinite(number):
-            raise InputError(f"constraint '{limit.name}' is {value!r}; give one finite number, or None.")
+            raise InputError(f"output '{limit.name}' is {value!r}; give one finite number, or None.")
         found.append(number)
     return tuple(found)
+
+
+def returned_outputs(
+    limits: tuple[Limit, ...], returned: Mapping[str, float | None]
+) -> tuple[Mapping[str, float | None], str]:
+    """Return what a function has returned besides its value, as far as it is to be told; or {} and what is wrong.
+
+    What has no limit and is not watched is left out, unless an output that has one is missing: it may be its name.
+    """
+    names = [limit.name for limit in limits]
+    missing = [limit.name for limit in limits if not limit.watched and limit.name not in returned]
+    told = {name: value for name, value in returned.items() if name in names}
+    if missing and len(told) == len(returned):
+        return {}, (
+            f"the function returned nothing of '{missing[0]}'; return (value, {{{missing[0]!r}: number}}), None as the "
+            "number where it could not be measured"
+        )
+    try:
+        checked_outputs(limits, returned if missing else told, failed=False)
+    except InputError as error:
+        return {}, str(error).rstrip(".")
+    return told, ""
 
 
 def _is_number(text: str) -> bool:

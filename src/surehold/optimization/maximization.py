@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
 from surehold.optimization.evaluation import Evaluation, in_processes, one_by_one
+from surehold.optimization.limits import returned_outputs
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.progress import progress_bar
 from surehold.optimization.recommendation import Recommendation
@@ -106,9 +107,10 @@ class Result:
         return int(np.nanargmin(y) if self.optimizer.direction == "minimize" else np.nanargmax(y))
 
     def to_dataframe(self) -> "DataFrame":
-        """Return the trials as a table of pandas: one column a variable, then value, failure, best and seconds.
+        """Return the trials as a table of pandas: variables, value, further outputs, failure, best and seconds.
 
-        The index is `Trial.index`. Raises SureholdError where pandas is not installed.
+        Whether a trial is feasible is among them where outputs have limits. The index is `Trial.index`. Raises
+        SureholdError where pandas is not installed.
         """
         try:
             import pandas
@@ -117,8 +119,13 @@ class Result:
         box = self.optimizer.box
         columns = [variable.name for variable in box.variables]
         table = pandas.DataFrame([box.as_dict(trial.x) for trial in self.trials], columns=columns)
-        for name, column in (("value", "y"), ("failure", "failure"), ("best", "best"), ("seconds", "seconds")):
-            values = [getattr(trial, column) for trial in self.trials]
+        rows: list[tuple[str, list[Any]]] = [("value", [trial.y for trial in self.trials])]
+        named = dict.fromkeys(name for trial in self.trials for name in trial.outputs)
+        rows += [(name, [trial.outputs.get(name, np.nan) for trial in self.trials]) for name in named]
+        if any(not limit.watched for limit in self.optimizer.limits):
+            rows.append(("feasible", self.optimizer.feasible[: len(self.trials)].tolist()))
+        rows += [(name, [getattr(trial, name) for trial in self.trials]) for name in ("failure", "best", "seconds")]
+        for name, values in rows:
             table[name if name not in table else f"trial {name}"] = values
         table.index.name = "trial"
         return table
@@ -181,8 +188,9 @@ def maximize(
     f
         Takes x (d,) in the box's units, or a dictionary {name: value} where the box has logarithms, whole numbers or
         choices; returns a number, with `constraints` a number and a dictionary of the further outputs,
-        (y, {"torque": 3.1}). A trial that raises, or gives anything but one finite number, is recorded as failed and
-        the run goes on. With `outcome="success"` it returns True or False.
+        (y, {"torque": 3.1}); outputs that `constraints` does not name are kept with the trial, unmodelled. A trial
+        that raises, or gives anything but one finite number, is recorded as failed and the run goes on. With
+        `outcome="success"` it returns True or False.
     n_trials
         Budget, initial design included.
     callback
@@ -291,13 +299,16 @@ def _optimizer(box: Box, n_trials: int, settings: dict[str, Any]) -> Optimizer:
 
 def _told(optimizer: Optimizer, evaluation: Evaluation, index: int) -> Trial:
     asked, y, failure, outputs, seconds = evaluation
+    told, wrong = ({}, "") if failure else returned_outputs(optimizer.limits, outputs)
+    if wrong:
+        y, failure, outputs = np.nan, wrong, {}
     try:
         if optimizer.outcome == "success" and not failure:
             if y not in (0.0, 1.0):
                 raise InputError(f"the function returned {y:g}, but outcome='success' needs True or False (or 1 or 0).")
             optimizer.tell(asked, success=bool(y))
         else:
-            optimizer.tell(asked, None if failure else y, failed=bool(failure), constraints=outputs or None)
+            optimizer.tell(asked, None if failure else y, failed=bool(failure), constraints=told or None)
     except InputError as error:  # of what the function returned; the run is not lost for it
         if optimizer.outcome == "success":
             raise

@@ -30,7 +30,7 @@ from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.success import described
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.surrogates.protocol import Posterior, Surrogate, mixture
-from surehold.optimization.trials import AskedTrial
+from surehold.optimization.trials import AskedTrial, Trials
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -132,8 +132,10 @@ class Optimizer(Record):
         all limits. By default None: trials may break them. What that guarantees, and what not, is said in
         `requirements.Requirements.admission`.
     failures
-        What a failed trial teaches. "lowest" (default): it counts as the lowest value told. "modelled": the response is
-        learnt from the others alone, and a model of where trials succeed multiplies the criterion by that probability.
+        What a failed trial teaches. "modelled": the response is learnt from the others alone, and a model of where
+        trials succeed multiplies the criterion by that probability. "lowest": it counts as the lowest value told. By
+        default "modelled" for the first 200 trials, of which such a model is cheap, and "lowest" beyond; in the thesis
+        presets "lowest".
     conditions
         Of a box with uncontrolled variables, while exploring: "commanded" (default), as in a simulator: every trial
         says at which condition it is to be made. "measured", as on a robot: trials are made at whatever comes, and each
@@ -179,7 +181,7 @@ class Optimizer(Record):
         feasible: float = FEASIBLE,
         safety: float | None = None,
         conditions: Literal["commanded", "measured"] = "commanded",
-        failures: Literal["lowest", "modelled"] = "lowest",
+        failures: Literal["lowest", "modelled"] | None = None,
         outcome: str = "value",
     ):
         given = {name: value for name, value in locals().items() if name not in ("self", "box", "__class__")}
@@ -349,7 +351,7 @@ class Optimizer(Record):
 
         Raises InputError if no trial has given a value yet.
         """
-        return self._model.diagnosis(self._trials)
+        return self._model.diagnosis(self._modelled)
 
     def promise(self) -> float:
         """Return the largest improvement that a further input is expected to bring, in the outputs' units.
@@ -363,9 +365,7 @@ class Optimizer(Record):
     @property
     def posterior(self) -> Posterior:
         """The surrogate conditioned on the trials told so far; inputs in the unit cube."""
-        if self._requirements is not None and self._requirements.failures and self._trials.successful.any():
-            return self._model.posterior(self._trials.without_failed())
-        return self._model.posterior(self._trials)
+        return self._model.posterior(self._modelled)
 
     def plot_slice(self, x: Any = None) -> "Figure":
         """Return the model along each coordinate, a figure of matplotlib; see `surehold.reports.slices.plot_slice`."""
@@ -381,6 +381,12 @@ class Optimizer(Record):
         return f"<Optimizer of {', '.join(self.box.names)} ({self.direction}): {', '.join(parts)}>"
 
     # --- inside -------------------------------------------------------------------------------------------------
+
+    @property
+    def _modelled(self) -> Trials:
+        """The trials that the response is learnt from."""
+        model_failures = self._requirements is not None and self._requirements.model_failures(self._trials)
+        return self._trials.without_failed() if model_failures else self._trials
 
     @property
     def _ranking(self) -> Ranking:

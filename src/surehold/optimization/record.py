@@ -74,6 +74,11 @@ class Record(ABC):
         return {limit.name: self._trials.outputs[:, k] for k, limit in enumerate(self._trials.limits)}
 
     @property
+    def limits(self) -> tuple[Limit, ...]:
+        """Limits of the further outputs, in the order of `constraints`; those that are only watched are among them."""
+        return self._trials.limits
+
+    @property
     def reached(self) -> NDArray[np.float64]:
         """Inputs truly reached (t, d), in the box's units: the commanded ones where nothing else was told."""
         return self.box.from_unit(self._trials.reached)
@@ -104,9 +109,8 @@ class Record(ABC):
         y
             One finite number.
         failed
-            True: the place gave nothing. The trial counts for the model as the lowest value told so far, so that the
-            place is avoided. "rig": the place is not at fault (a camera hung, a person came in the way). The trial
-            leaves no trace, and its number is asked for again.
+            True: the place gave nothing, and is avoided from then on, see `failures`. "rig": the place is not at fault
+            (a camera hung, a person came in the way). The trial leaves no trace, and its number is asked for again.
         reached
             Where the trial truly was, (d,), where that is known; inside of the box or not. The model learns from
             there; more than 1e6 box widths away counts as 1e6. `recommend` answers inputs inside the box only.

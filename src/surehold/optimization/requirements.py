@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from surehold.defaults import ANCHORS, APART, SUCCESS_SHARE
+from surehold.defaults import ANCHORS, APART, FAILURE_POWER, SUCCESS_SHARE
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.admission import Admission, Likelihood, Requirement
@@ -57,7 +57,7 @@ class Requirements:
     noise
         Observation noise of the outputs: "none" or "inferred".
     failures
-        Whether it is learnt where trials fail.
+        Up to how many trials it is learnt where they fail.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Requirements:
         noise: NoiseName,
         lattice: Lattice | None,
         seed: int,
-        failures: bool = False,
+        failures: float = 0,
     ):
         self.failures: Final = failures
         self.region: Final = region
@@ -88,6 +88,7 @@ class Requirements:
         self._seed: Final = seed
         self._limited: Final = tuple(k for k, limit in enumerate(limits) if not limit.watched)
         self._success: tuple[int, SuccessModel] | None = None
+        self._allowed: list[bool] = []
         self._cautious: Final[dict[int, tuple[int, Posterior]]] = {}
         self._models: Final = {k: self._model(GaussianProcess(noise=noise), k) for k in range(len(limits))}
 
@@ -97,6 +98,7 @@ class Requirements:
             model.forget()
         self._cautious.clear()
         self._success = None
+        self._allowed = []
 
     # --- which trials are feasible --------------------------------------------------------------------------------
 
@@ -116,9 +118,24 @@ class Requirements:
             found[known] = self._missed(told[known]).max(axis=1, initial=-np.inf) <= 0.0
         if not known.all() and self._limited:
             found[~known] = self.probability(trials, places[~known])
-        if self.region is not None and len(trials):
-            found[~self.region.contains(places)] = 0.0
+        found[~self._allowed_at(trials)] = 0.0
+        if self.safety is not None and self._unmeasured(trials):
+            found[:] = 0.0
         return found
+
+    def _allowed_at(self, trials: Trials) -> NDArray[np.bool_]:
+        """Tell where trials were made at allowed inputs, (t,): asked once of each, for a function may take its time."""
+        if self.region is None:
+            return np.ones(len(trials), dtype=bool)
+        new = trials.places[len(self._allowed) :]
+        if len(new):
+            self._allowed += self.region.contains(new).tolist()
+        return np.array(self._allowed, dtype=bool)
+
+    def _unmeasured(self, trials: Trials) -> list[str]:
+        """Return the names of limited outputs that no trial has measured."""
+        measured = self._measured(trials)
+        return [self.limits[k].name for k in self._limited if k not in measured]
 
     def feasible(self, trials: Trials) -> NDArray[np.bool_]:
         """Tell which trials may become the answer, (t,)."""
@@ -130,8 +147,13 @@ class Requirements:
         found[found] = share >= min(self.level, SUCCESS_SHARE * share.max())
         return found
 
+    def model_failures(self, trials: Trials) -> bool:
+        """Tell whether failed trials teach where trials fail, and nothing of the response."""
+        successful = trials.successful
+        return len(trials) <= self.failures and bool(successful.any()) and not successful.all()
+
     def _where_it_fails(self, trials: Trials) -> SuccessModel | None:
-        if not self.failures or trials.successful.all():
+        if not self.model_failures(trials):
             return None
         if self._success is None or self._success[0] != len(trials):
             self._success = (len(trials), SuccessModel(trials.reached, trials.successful))
@@ -139,6 +161,9 @@ class Requirements:
 
     def shortfall(self, trials: Trials) -> str:
         """Return in words that nothing feasible is known, and what came nearest; empty where something is."""
+        if unmeasured := self._unmeasured(trials):
+            names = " and ".join(unmeasured)
+            return f"none of {len(trials)} trials has measured {names}: whether limits are kept there is not known."
         if self.feasible(trials).any():
             return ""
         told = trials.outputs[:, list(self._limited)]
@@ -164,7 +189,7 @@ class Requirements:
         Raises InputError if no allowed trial has given a value.
         """
         share = np.where(trials.eligible, self.feasibility(trials), -1.0)
-        if self.region is not None and not (trials.eligible & self.region.contains(trials.places)).any():
+        if not (trials.eligible & self._allowed_at(trials)).any():
             raise InputError("no trial at an allowed input has given a value yet; ask for one, and tell its outcome.")
         best = share >= share.max() - 1e-12
         if best.sum() > 1:  # all certainly infeasible: the one that misses least
@@ -177,6 +202,8 @@ class Requirements:
         self, answer: Recommendation, trials: Trials, u: NDArray[np.float64], reached: Perturbations, sign: float
     ) -> Recommendation:
         """Return the answer at u (d,) with what is known of its outputs and of its feasibility."""
+        if self.region is None and not self.limits and not self.model_failures(trials):
+            return answer
         posteriors = self.posteriors(trials)
         outputs = {name: execution_at(posterior, reached, u) for name, posterior in posteriors.items()}
         tried = np.flatnonzero(trials.eligible & same(u, trials.places)) if self._ranking.exact_inputs else []
@@ -184,6 +211,8 @@ class Requirements:
             share = float(self.feasibility(trials)[tried].max())
         else:
             share = float(execution_probability(self._outputs(trials), reached, u[None, :])[0])
+        if self._unmeasured(trials):  # nothing is known: no promise is made
+            share = 0.0
         highest = int(np.nanargmax(trials.values))
         refused = answer.refused
         if not self.feasible(trials)[highest]:
@@ -197,10 +226,16 @@ class Requirements:
         parts = [f"{self.limits[i].name} by {m:.3g}" for i, m in zip(self._limited, missed, strict=True) if m > 0.0]
         if parts:
             return f"{start}missed {' and '.join(parts)}."
-        if self.region is not None and not self.region.contains(trials.places[k : k + 1])[0]:
+        if not self._allowed_at(trials)[k]:
             return f"{start}is not allowed."
-        if not self._limited:
+        if not trials.eligible[k]:
             return f"{start}reached a place outside of the box."
+        if (model := self._where_it_fails(trials)) is not None and not self._ranking.exact_inputs:
+            share = float(
+                np.exp(Succeeds(model, self._ranking.accurate).log_probability(trials.places[k : k + 1])[0][0])
+            )
+            if share < self.level:
+                return f"{start}only {share:.0%} of its executions are expected to succeed."
         share = float(self.probability(trials, trials.places[k : k + 1])[0])
         return f"{start}only {share:.0%} of its executions are expected to keep all limits."
 
@@ -225,7 +260,7 @@ class Requirements:
             Within(posterior, limit, perturbations, float(ndtri(share))) for posterior, limit in outputs
         )
         if fails is not None:
-            within = (*within, Succeeds(fails, perturbations))
+            within = (*within, Succeeds(fails, perturbations, FAILURE_POWER))
         safety = self.safety
         if safety is None:
             return Admission(self.region, within)
@@ -254,14 +289,22 @@ class Requirements:
         logs = admission.log_probability(found)[0] + np.log(-np.expm1(-0.5 * (far / APART) ** 2) + 1e-300)
         return found[np.argsort(-logs, kind="stable")]
 
-    def strict(self, trials: Trials) -> Admission:
-        """Return what an answer has to respect that was never tried."""
-        outputs = self._outputs(trials)
+    def strict(self, trials: Trials) -> Admission | None:
+        """Return what an answer has to respect that was never tried; None for nothing."""
+        outputs, model = self._outputs(trials), self._where_it_fails(trials)
+        if self.region is None and not outputs and model is None:
+            return None
+        succeeds = None if model is None else Succeeds(model, self._ranking.accurate)
+        least = -np.inf
+        if succeeds is not None:
+            best = succeeds.log_probability(trials.places[trials.eligible])[0].max()
+            least = float(np.minimum(np.log(self.level), np.log(SUCCESS_SHARE) + best))
 
         def feasible(U: NDArray[np.float64]) -> NDArray[np.bool_]:
-            return execution_probability(outputs, self._ranking.accurate, U) >= self.level
+            found = execution_probability(outputs, self._ranking.accurate, U) >= self.level
+            return found if succeeds is None else found & (succeeds.log_probability(U)[0] >= least)
 
-        return Admission(self.region, (), feasible if outputs else None)
+        return Admission(self.region, (), feasible if outputs or succeeds is not None else None)
 
     def initial(self, design: NDArray[np.float64], first: NDArray[np.float64], rng: Any) -> NDArray[np.float64]:
         """Return an initial design (n, d) whose points are allowed; `first` (k, d) come before it."""
@@ -272,7 +315,9 @@ class Requirements:
         if self.safety is not None:
             return trials.places[int(np.argmax(np.where(trials.eligible, self.feasibility(trials), -1.0)))]
         points = np.concatenate([trials.places, trials.pending])
-        if self.failures and len(points):  # nothing has succeeded: where nothing has been tried
+        if (
+            self.failures and len(points) and not trials.successful.any()
+        ):  # nothing has succeeded: where nothing has been tried
             holes = largest_holes(points, rng, self.admission(trials))
             if len(holes):
                 return holes[0]

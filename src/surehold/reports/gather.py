@@ -87,7 +87,7 @@ def candidate(
 def _of_constraints(result: Result) -> list[str]:
     """Return in words whether the recommended input satisfies what was required besides a good value."""
     best, trials = result.recommendation, result.optimizer.feasible
-    found = [best.infeasible[:1].upper() + best.infeasible[1:]] if best.infeasible else []
+    found: list[str] = []
     if best.outputs:
         expected = ", ".join(f"{name} {outcome.mean:.4g}" for name, outcome in best.outputs.items())
         found.append(
@@ -159,7 +159,7 @@ def report_of(
         X=result.X[:, shown],
         y=y,
         n_initial=optimizer.n_initial,
-        best_trace=np.full(y.size, np.nan) if counted else _running_best(y, minimized),
+        best_trace=_running_best(np.where(_countable(result) & (not counted), y, np.nan), minimized),
         candidates=tuple(
             replace(
                 candidate,
@@ -176,6 +176,7 @@ def report_of(
         success_above=success_above,
         outcomes=outcomes or {},
         advice=advice,
+        infeasible=result.recommendation.infeasible,
         surfaces=surfaces_of(optimizer, noise, [c.x for c in candidates], shown),
         warning=result.recommendation.warning,
         interrupted=result.interrupted,
@@ -209,6 +210,13 @@ def _covariance_at(noise: InputNoise, box: Box, x: NDArray[np.floating]) -> NDAr
 
 def _unit_answer(result: Result) -> NDArray[np.float64]:
     return result.optimizer.box.to_unit(result.recommendation.x)
+
+
+def _countable(result: Result) -> NDArray[np.bool_]:
+    """Tell which trials may be the best one, (t,): those that keep all limits, or all where none does."""
+    feasible = result.optimizer.feasible
+    limited = any(not limit.watched for limit in result.optimizer.limits)
+    return feasible if limited and feasible.any() else np.ones(len(result.y), dtype=bool)
 
 
 def _running_best(y: NDArray[np.float64], minimized: bool) -> NDArray[np.float64]:

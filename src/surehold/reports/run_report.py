@@ -180,6 +180,7 @@ class RunReport:
     success_above: float | None = None  #: what a trial that succeeds is worth more than; None where any value will do
     outcomes: Mapping[str, int] = field(default_factory=dict)  #: how many trials ended how, where none succeeded
     advice: str = ""  #: what to try where no trial succeeded
+    infeasible: str = ""  #: why no trial is known to keep all limits; empty where one does
     warning: str = ""  #: what is wrong with the model that the recommendation rests on
     surfaces: tuple[Surface, ...] = ()
     interrupted: bool = False
@@ -213,6 +214,8 @@ class RunReport:
     def succeeded(self) -> bool:
         """Whether any trial succeeded."""
         told = self.y[~self.failed]
+        if self.infeasible:
+            return False
         return bool(told.size) and (self.success_above is None or float(told.max()) > self.success_above)
 
     @property

@@ -147,6 +147,13 @@ def _of_the_run(report: RunReport) -> Verdict:
 
 def _of_nothing(report: RunReport) -> Verdict:
     """Return the verdict where no trial succeeded: no winner among them."""
+    if report.infeasible:
+        return Verdict(
+            report.infeasible[:1].upper() + report.infeasible[1:],
+            f"The point shown ({_trial(report.recommended)} of {report.y.size}) comes nearest and is no answer. "
+            "Widen the limits, or the box.",
+            False,
+        )
     counts = sorted(report.outcomes.items(), key=lambda item: -item[1])
     ended = "; ".join(f"{n} × {status}" for status, n in counts)
     met = f": no {report.quality_name} above {number(report.success_above)} was met" * (not report.counted)

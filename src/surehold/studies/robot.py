@@ -62,6 +62,7 @@ class RobotStudy:
     storage : Storage
     study : the study of Optuna, with surehold's sampler
     sampler : that sampler
+    limits : tuple of Limit, of the further outputs
     """
 
     def __init__(self, name: str, storage: Storage, study: Study, settings: StudySettings):
@@ -71,6 +72,7 @@ class RobotStudy:
         self.study: Final = study
         self.sampler: Final = settings.sampler()
         study.sampler = self.sampler
+        self.limits: Final = limits_of(settings.optimizer.get("constraints"))
         self._ledger: Final = Ledger(storage.backend, name, settings.space)
 
     @classmethod
@@ -239,9 +241,8 @@ class RobotStudy:
             )
 
     def _checked(self, constraints: Mapping[str, Any] | None, failed: bool) -> dict[str, float]:
-        limits = limits_of(self.settings.optimizer.get("constraints"))
-        values = checked_outputs(limits, constraints, failed)
-        return {limit.name: value for limit, value in zip(limits, values, strict=True) if np.isfinite(value)}
+        values = checked_outputs(self.limits, constraints, failed)
+        return {limit.name: value for limit, value in zip(self.limits, values, strict=True) if np.isfinite(value)}
 
     def add(
         self,

@@ -19,7 +19,8 @@ from optuna import logging
 from optuna.trial import TrialState
 
 from surehold.errors import InputError
-from surehold.studies.ledger import holder_of
+from surehold.optimization.limits import returned_outputs
+from surehold.studies.ledger import AnswerRefused, holder_of
 from surehold.studies.robot import Asked, NothingToAsk, RobotStudy
 from surehold.studies.storage import StorageFailure
 from surehold.studies.trial_function import Outcome
@@ -100,25 +101,36 @@ def work(
         before(asked)
         with _alive(study, asked.id, name, lifetime):
             outcome = attempt(asked.parameters)
-        _tell(study, asked.id, outcome)
+        outcome = _tell(study, asked.id, outcome)
         made += 1
         after(asked, outcome)
     return made
 
 
-def _tell(study: RobotStudy, id: int, outcome: Outcome) -> None:
+def _tell(study: RobotStudy, id: int, outcome: Outcome) -> Outcome:
+    """Store what came of a trial, and return it: a failure where the study cannot take what the function returned."""
+    told, wrong = ({}, "") if outcome.failure else returned_outputs(study.limits, outcome.outputs)
+    if wrong:
+        outcome = Outcome(float("nan"), wrong)
     failed = bool(outcome.failure)
     value = None if failed else outcome.value
     said = "failed" if failed else f"value {value!r}"
     try:
         _patiently(
-            lambda: study.tell(id, value, failed=failed, constraints=dict(outcome.outputs) or None),
+            lambda: study.tell(id, value, failed=failed, constraints=dict(told) or None),
             f"trial {id} ({said}) could not be stored",
         )
     except StorageFailure:
         raise
-    except InputError as error:  # another worker had taken the trial up, and was quicker
+    except AnswerRefused as error:  # another worker had taken the trial up, and was quicker
         _log.warning(f"{error} (answer of this worker: {said})")
+    except InputError as error:  # it would be handed out again and again
+        if failed:
+            raise
+        return _tell(study, id, Outcome(float("nan"), str(error).rstrip(".")))
+    if failed:
+        _log.info(f"trial {id} failed: {outcome.failure}")
+    return outcome
 
 
 def _mortal(study: RobotStudy) -> bool:

@@ -6,6 +6,7 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.input import Region, checked_rules
 from surehold.optimization.lattice import lattice_of
+from surehold.optimization.maximization import maximize
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.optimizer import Optimizer
@@ -136,15 +137,26 @@ def test_a_function_that_raises_later_loses_no_trial():
         return 1.0 / limit[0] > 0.0
 
     optimizer = Optimizer(BOX, allowed=fickle, n_initial=2, seed=0)
-    for _ in range(2):
+    for _ in range(3):
         optimizer.tell(optimizer.ask(), 1.0)
     limit[0] = 0.0
-    with pytest.raises(InputError, match="ZeroDivisionError"):
-        optimizer.ask()
-    assert len(optimizer.X) == 2
-    assert len(optimizer.pending) == 0
+    with pytest.warns(UserWarning, match="allowed raised ZeroDivisionError at x = .* are not allowed"):
+        x = optimizer.ask()
+    optimizer.tell(x, 2.0)
+    assert len(optimizer.X) == 4
+    assert optimizer.recommend().observed == 1.0  # whether the last trial was allowed was never answered
     limit[0] = 1.0
     assert optimizer.ask().shape == (2,)
+
+
+def test_a_whole_run_survives_a_function_that_raises_in_a_corner():
+    def allowed(x):
+        return 1.0 / float(x[0] + x[1] + 1.0) < 3.0  # raises where both are lowest
+
+    with pytest.warns(UserWarning, match="allowed raised ZeroDivisionError"):
+        result = maximize(lambda x: -x[0] - x[1], Box({"a": (-0.5, 1.0), "b": (-0.5, 1.0)}), 18, allowed=allowed)
+    assert len(result.y) == 18
+    assert result.recommendation.x.sum() == pytest.approx(-2.0 / 3.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("border", ["extend", "clip", "keep"])

@@ -136,9 +136,10 @@ class SuccessModel:
 
 
 class Succeeds:
-    """The requirement that an execution succeeds, over the input noise."""
+    """The requirement that an execution succeeds, over the input noise; its probability counts to the given power."""
 
-    def __init__(self, model: SuccessModel, perturbations: Perturbations):
+    def __init__(self, model: SuccessModel, perturbations: Perturbations, power: float = 1.0):
+        self._power: Final = power
         self._model: Final = model
         self._perturbations: Final = perturbations
 
@@ -152,9 +153,9 @@ class Succeeds:
         P, slopes = self._model.probability(points.reshape(-1, d), gradient)
         total = np.maximum(P.reshape(q, -1) @ weights, 1e-300)
         if not gradient:
-            return np.log(total), np.zeros((0, d))
+            return self._power * np.log(total), np.zeros((0, d))
         slopes = slopes.reshape(q, -1, d) if free is None else slopes.reshape(q, -1, d) * free
-        return np.log(total), np.einsum("s,qsd->qd", weights, slopes) / total[:, None]
+        return self._power * np.log(total), self._power * np.einsum("s,qsd->qd", weights, slopes) / total[:, None]
 
 
 def _distances(A: NDArray[np.float64], B: NDArray[np.float64]) -> NDArray[np.float64]:

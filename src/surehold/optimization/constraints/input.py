@@ -6,6 +6,7 @@ Where input noise carries an execution across the region's border, the rule at t
 (`Perturbations`): "extend" lets it, "keep" gives it the commanded input, "clip" draws it back towards that one.
 """
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
@@ -81,7 +82,8 @@ class Region:
     Raises
     ------
     InputError
-        If nothing that is allowed is found, or a function raises or returns anything but True or False.
+        If nothing that is allowed is found, or a function raises or returns anything but True or False. Once the region
+        is made, an input for which that happens is not allowed, and the first one is warned of: no trial is lost.
     """
 
     def __init__(
@@ -100,8 +102,10 @@ class Region:
         self._low: Final = lower - base - slack
         self._high: Final = upper - base + slack
         self._texts: Final = tuple(str(rule) for rule in linear)
+        self._made = self._reported = False
         self.points: Final = self._found(np.random.default_rng([seed, 6]), known)
         self.points.flags.writeable = False
+        self._made = True
 
     def contains(self, U: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which points U (q, d) are allowed, (q,)."""
@@ -148,15 +152,19 @@ class Region:
         try:
             answer = function(x)
         except Exception as error:  # whatever a user's function raises
-            raise InputError(
-                f"allowed raised {type(error).__name__} at x = {self._box.as_dict(x)}: {error}. It must answer for "
-                "every x in the box; no trial is lost."
-            ) from error
+            return self._without(f"raised {type(error).__name__} at x = {self._box.as_dict(x)}: {error}")
         if isinstance(answer, (bool, np.bool_)) or (isinstance(answer, np.ndarray) and answer.shape == ()):
             return bool(answer)
-        raise InputError(
-            f"allowed returned {answer!r} at x = {self._box.as_dict(x)}; give a function that returns True or False."
-        )
+        return self._without(f"returned {answer!r} at x = {self._box.as_dict(x)}")
+
+    def _without(self, what: str) -> bool:
+        """Return False for an input of which a function says nothing; raises InputError while the region is made."""
+        if not self._made:
+            raise InputError(f"allowed {what}. Give a function that returns True or False for every x in the box.")
+        if not self._reported:
+            self._reported = True
+            warnings.warn(f"allowed {what}. Inputs for which it does so are not allowed.", stacklevel=2)
+        return False
 
     def _step(self, at: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
         """Move every walker (n, d) once."""
