@@ -87,6 +87,11 @@ def test_an_exploration(here, capsys):
         ("explore mug --trials 0", "--trials is 0"),
         ("explore mug --noise none", "--noise is none"),
         ("explore mug --cloud bottle.npz", "leave --cloud out"),
+        ("explore", "no object is given"),
+        ("explore --study cup", "takes one of --box x,y,z and --cloud"),
+        ("explore mug --box 0.1,0.1,0.1 --study cup", "and no object"),
+        ("explore --box 0.1,0.1 --study cup", "three edges"),
+        ("explore --box 80,60,120 --study cup", "in meters"),
     ],
 )
 def test_bad_input_is_one_line(line, said, capsys):
@@ -94,3 +99,75 @@ def test_bad_input_is_one_line(line, said, capsys):
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
+
+
+def test_a_robot_tells_contacts_and_the_next_trial_follows_from_them(here, capsys):
+    made = surehold("explore --box 0.06,0.06,0.2 --study cup --variables dx,dy --facet right-front --seed 3")
+    assert made == 0
+    assert "study tell cup" in capsys.readouterr().out
+
+    def asked():
+        capsys.readouterr()
+        assert surehold("study ask cup --worker arm --json") == 0
+        return json.loads(capsys.readouterr().out)
+
+    first = asked()
+    assert sorted(first["parameters"]) == ["dx", "dy"]
+    assert len(first["pose"]["position"]) == 3
+    rows = [{"point": [0.02, 0.0, z], "normal": [1.0, 0.0, 0.0]} for z in (-0.05, 0.0, 0.05)]  # 10 mm inside the box
+    (here / "touched.json").write_text(json.dumps({"contacts": rows}))
+    assert surehold("study tell cup 0 0.4 --contacts touched.json") == 0
+    from surehold.studies.robot import RobotStudy
+
+    study = RobotStudy.open("cup")
+    surface = study._touched._told(study.trials(), study.settings.space).belief.surface
+    assert np.abs(surface.value(np.array([[0.02, 0.0, 0.0]]))[0]) < 0.001
+    with_contacts = asked()["parameters"]
+    assert surehold("explore --box 0.06,0.06,0.2 --study same --variables dx,dy --facet right-front --seed 3") == 0
+    assert surehold("study ask same --json") == 0
+    assert surehold("study tell same 0 0.4") == 0
+    without = RobotStudy.open("same").next()
+    assert with_contacts != without
+    # The same answer again is harmless, another one is refused.
+    assert surehold("study tell cup 0 0.4 --contacts touched.json") == 0
+    (here / "touched.json").write_text(json.dumps({"contacts": rows[:1]}))
+    assert surehold("study tell cup 0 0.4 --contacts touched.json") == 2
+    assert "with other contacts" in capsys.readouterr().err
+    capsys.readouterr()
+    assert surehold("study recommend cup --json") == 0
+    assert json.loads(capsys.readouterr().out)["trial"] == 0
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({"contacts": []}, "hold 0 touches"),
+        ({"contacts": [{"point": [0.03, 0, 0], "normal": [2, 0, 0]}]}, "unit normals"),
+        ({"contacts": [{"point": [30.0, 0, 50.0], "normal": [1, 0, 0]}]}, "give meters"),
+        ({"contacts": [{"point": [0.4, 0, 0], "normal": [1, 0, 0]}]}, "mm off the surface"),
+        (
+            {"contacts": [{"point": [0.03, 0, 0], "normal": [v, 0, 0]} for v in (1, -1)]},
+            "normals 180 degrees",
+        ),
+        ({"contacts": [{"point": [0.03, 0], "normal": [1, 0, 0]}]}, "not read"),
+        ({"touches": 3}, "not read ('contacts')"),
+    ],
+)
+def test_contacts_that_cannot_be_are_refused_in_one_line(here, capsys, told, said):
+    assert surehold("explore --box 0.06,0.06,0.2 --study cup --variables dx,dy --facet right-front") == 0
+    assert surehold("study ask cup --json") == 0
+    (here / "touched.json").write_text(json.dumps(told))
+    capsys.readouterr()
+    assert surehold("study tell cup 0 0.4 --contacts touched.json") == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_contacts_are_for_studies_of_a_shape(here, capsys):
+    assert surehold("study create rig --parameters x=0:1") == 0
+    assert surehold("study ask rig --json") == 0
+    (here / "touched.json").write_text(json.dumps({"contacts": [{"point": [0, 0, 0], "normal": [1, 0, 0]}]}))
+    capsys.readouterr()
+    assert surehold("study tell rig 0 0.4 --contacts touched.json") == 2
+    assert "not about a shape that is touched" in capsys.readouterr().err

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 CELL: Final = (1.0 / 50.0, 0.002, 0.004)
 #: Standard deviation and length scale of what a mirrored shape is off, in mean half extents of its box; chosen by
 #: benchmarks/unknown_shapes.py on shapes that are not the shipped ones.
-SPREAD: Final = (0.4, 0.6)
+SPREAD: Final = (0.4, 0.4)
 _BASE_POINTS: Final = 800  # of the cloud, of which the mirrored shape is made
 _MIRROR_NOISE: Final = 0.003  # of a mirrored point [m]
 _MOST_TURN: Final = 50.0  # between mirror plane and view [degrees]
