@@ -36,7 +36,7 @@ from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.grasp.touch import touch_trial
 
 NOISE = sh.InputNoise.unit(0.03)
-TRIALS, INITIAL = 40, 20
+TRIALS, INITIAL = 30, 15
 
 
 def solid_object(name, solids):
@@ -101,9 +101,11 @@ def grasp(objects, args):
             if known(args, key):
                 continue
             _, cloud = view_of(obj, view, 1000, 0.001)
-            belief = belief_of_cloud(cloud, name=name, mass=obj.mass, friction=obj.friction)
+            belief = belief_of_cloud(cloud, name=name, mass=obj.mass, friction=obj.friction, cell=0.004)
             mean, *draws = belief.objects(8, np.random.default_rng(0))
-            trusted = belief_of_cloud(cloud, name=name, mass=obj.mass, friction=obj.friction, spread=(0.01, SPREAD[1]))
+            trusted = (
+                belief if belief.surface.prior is belief.surface.first else belief.with_surface(belief.surface.prior)
+            )
             problem = GraspProblem(mean)
             real = problem.on(obj)
             row = {}

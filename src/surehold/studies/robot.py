@@ -251,8 +251,8 @@ class RobotStudy:
         Raises
         ------
         InputError
-            If there is no such trial, contacts are refused, the value or what was reached is not finite, or the trial was told something else
-            before. What was told before stays.
+            If there is no such trial, contacts are refused, the value or what was reached is not finite, or the trial
+            was told something else before. What was told before stays.
         """
         with self.storage.failures():
             if contacts is not None:

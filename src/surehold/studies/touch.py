@@ -1,4 +1,4 @@
-"""A study of an object whose shape is not known: its trials tell contacts, and the next one is asked from what they say.
+"""A study of an object whose shape is not known: trials tell contacts, and the next is asked from what they say.
 
 The study's problem is `{"touch": words}`: the words of a grasp (surehold.problems.grasp.options), with a cloud, or with
 "box": the edges of the object's box [m], whose middle is then the origin of the object's frame; and "goal", as of
