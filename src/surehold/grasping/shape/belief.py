@@ -127,7 +127,7 @@ class _Waves:
         """Return the draws (p, b) at points (p, 3)."""
         turned, start, weights = (a.astype(np.float32) for a in (self._o.T, self._a, self._w))  # some micrometers
         parts = [np.cos(part.astype(np.float32) @ turned + start) @ weights for part in _parts(points)]
-        return np.vstack([np.empty((0, self._w.shape[1])), *parts])
+        return np.vstack([np.empty((0, self._w.shape[1])), *parts]).astype(np.float64)
 
     def slope(self, points: Array) -> Array:
         """Return the slopes of the draws (3 p, b), three rows a point."""
