@@ -171,3 +171,38 @@ def test_contacts_are_for_studies_of_a_shape(here, capsys):
     capsys.readouterr()
     assert surehold("study tell rig 0 0.4 --contacts touched.json") == 2
     assert "not about a shape that is touched" in capsys.readouterr().err
+
+
+def test_contacts_come_over_http_as_well(here):
+    from fastapi.testclient import TestClient
+
+    from surehold.studies.robot import RobotStudy
+    from surehold.studies.service import new_token, service
+
+    assert surehold("explore --box 0.06,0.06,0.2 --study cup --variables dx,dy --facet right-front") == 0
+    study, token = RobotStudy.open("cup"), new_token()
+    client = TestClient(service(study, token), base_url="http://127.0.0.1/studies/cup")
+    client.headers["Authorization"] = f"Bearer {token}"
+    asked = client.post("/ask", json={}).json()
+    assert len(asked["pose"]["quaternion"]) == 4
+    touches = {"contacts": [{"point": [0.02, 0.0, 0.0], "normal": [1.0, 0.0, 0.0]}], "free": [[0.05, 0.0, 0.0, 0.01]]}
+    answer = {"id": asked["id"], "value": 0.4, "touches": touches}
+    assert client.post("/tell", json=answer).json()["state"] == "complete"
+    assert study.trials()[0].user_attrs["surehold:contacts"] == touches
+    wrong = {"id": asked["id"], "value": 0.4, "touches": {"contacts": [{"point": [0.02, 0.0], "normal": [1, 0, 0]}]}}
+    assert client.post("/tell", json=wrong).status_code == 422
+
+
+def test_an_unseen_side_under_the_contacts_is_said(here):
+    from surehold.cli.grasp import known_at
+    from surehold.problems.grasp.from_cloud import object_of_cloud
+    from surehold.problems.grasp.options import checked_words
+    from surehold.problems.grasp.problem import GraspProblem
+
+    body = object_of_cloud(checked_words({"object": "", "cloud": "bottle.npz", "shapes": 3}))[0]
+    with np.load("bottle.npz") as file:
+        seen, camera = file["points"], file["camera"]
+    problem = GraspProblem(shipped_object("bottle")).on(body)
+    assert "scan it" not in known_at(problem, seen[:20])["shape at the contacts"]
+    far = body.vertices[np.argsort(-np.linalg.norm(body.vertices - camera, axis=1))[:20]]
+    assert "scan it" in known_at(problem, far)["shape at the contacts"]
