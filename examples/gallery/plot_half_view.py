@@ -19,8 +19,8 @@ from surehold.reports.still import still_picture
 from surehold.reports.uncertain_shape import LEGEND, shape_meshes
 
 mug = shipped_object("mug")
-camera = camera_towards(mug, azimuth=0.6, elevation=0.6)
-points = half_view(mug, camera, 400, 0.001, np.random.default_rng(0))
+camera = camera_towards(mug, azimuth=0.6, elevation=0.3)
+points = half_view(mug, camera, 800, 0.001, np.random.default_rng(0))
 belief = belief_of_cloud(cleaned(points, camera=camera), cell=0.004)
 mean = belief.mean_object()
 deviation = belief.surface.deviation(mean.vertices)
