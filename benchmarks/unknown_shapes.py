@@ -2,8 +2,9 @@
 
 shape    distance of the true surface to the one believed [mm], mean and 95 %, of half views of 500, 2,000 and 5,000
          points with 0, 1 and 3 mm noise, and the share of true surface points in the believed 95 % interval, of what
-         the camera saw and of what it did not, and the share of the believed surface in it. `--training` takes shapes that are not the shipped ones: the spread of
-         mirrored shapes (surehold.grasping.shape.completion.SPREAD) was chosen on these
+         the camera saw and of what it did not, and the share of the believed surface in it. `--training` takes shapes
+         that are not the shipped ones: the spread of mirrored shapes (surehold.grasping.shape.completion.SPREAD) was
+         chosen on these
 grasp    a grasp is planned on a half view (1,000 points, 1 mm): on 8 draws of the shape, on the mean surface alone, and
          on the cloud mirrored and believed; then it is queried 200 times on the true shape under input noise
 explore  from a box: the true worth of the recommendation after 20 and 40 trials, beside optimization without a shape
