@@ -119,6 +119,14 @@ def test_intervals_that_are_too_narrow_are_found_out():
     assert "95 % intervals hold" in found.warning
 
 
+def test_nothing_is_said_of_trials_at_one_place():
+    optimizer = sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), noise="inferred", seed=0)
+    for value in np.random.default_rng(0).normal(size=30):
+        optimizer.tell([0.5], value)
+    assert optimizer.diagnosis() is None
+    assert optimizer.recommend().x == pytest.approx([0.5])
+
+
 def test_nothing_is_said_of_few_trials_or_of_equal_values():
     X, y = crowded(12)
     few = Diagnosis(error=2.0, excess=3.0, coverage=0.1, disagreement=0.0, resolution=1.0, n=9)

@@ -79,15 +79,18 @@ class Diagnosis:
 def diagnosis(posterior: Posterior, X: NDArray[np.float64], y: NDArray[np.float64]) -> Diagnosis | None:
     """Return how well a posterior explains the trials X (n, d), y (n,) that it is conditioned on.
 
-    None where it cannot leave a trial out, where there is one trial only, or where all values are equal.
+    None where it cannot leave a trial out, where all trials are at one place, or where all values are equal.
     """
     n, d = X.shape
     if n < 2 or not isinstance(posterior, LeavesOut) or np.ptp(y) == 0.0:
         return None
+    w = shares(X)
+    if w.max() == 1.0:
+        return None
     unit = float(np.abs(y - y.mean()).max())  # squares may overflow
     left_out = posterior.left_out()
     mean, variance = mixture(left_out)
-    error, w = (y - mean) / unit, shares(X)
+    error = (y - mean) / unit
     constant = (y - w @ y) / unit / (1.0 - w)  # the mean, too, has not seen the trial
     excess = error**2 - constant**2
     gap = float(w @ excess)

@@ -17,14 +17,12 @@ from surehold.defaults import OUTLIER_DISTANCE, ROUNDED
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit, checked_outputs
-from surehold.optimization.points import numbers_of
+from surehold.optimization.trial_inputs import trial_input, trial_inputs
+from surehold.optimization.values import number_of
 
-__all__ = ["AskedTrial", "Trials", "initial_inputs", "number_of", "same", "told_noise"]
+__all__ = ["AskedTrial", "Trials", "same"]
 
 _SEPARATION: Final = 1e-6  # points closer than this in every coordinate of the unit cube are the same trial
-# A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
-# it stay finite.
-_FARTHEST: Final = 1e6
 
 
 @dataclass(frozen=True)
@@ -193,7 +191,7 @@ class Trials:
             raise unknown_name("kind of failure", failed, ("True", "rig"))
         number, commanded, actual = self._commanded_by(x)
         if reached is not None:
-            actual = self._anywhere("reached", reached)
+            actual = trial_input(self._box, "reached", reached)
         if failed and y is not None:
             raise InputError(f"a failed trial has no value, but y is {y!r}; leave one of the two out.")
         value = np.nan if failed else number_of(y)
@@ -221,10 +219,10 @@ class Trials:
         deviations: ArrayLike | None = None,
     ) -> None:
         """Take over stored trials; see `Optimizer.restore`. Nothing is taken over where an argument is bad."""
-        commanded, waiting = self._all("X", X, inside=True), self._all("pending", pending, inside=True)
-        self.restore_cube(
-            commanded, y, self._all("reached", reached, inside=False), waiting, numbers, outputs, executions, deviations
-        )
+        inputs = trial_inputs(self._box, "X", X, inside=True)
+        waiting = trial_inputs(self._box, "pending", pending, inside=True)
+        actual = trial_inputs(self._box, "reached", reached, inside=False)
+        self.restore_cube(inputs, y, actual, waiting, numbers, outputs, executions, deviations)
 
     def restore_cube(
         self,
@@ -318,7 +316,7 @@ class Trials:
         if isinstance(x, AskedTrial):
             number = self._numbered(x)
             return number, self._pending[number], self._pending[number]
-        u = self._anywhere("x", x)
+        u = trial_input(self._box, "x", x)
         number = self._waiting(u)
         if np.all((u >= 0.0) & (u <= 1.0)):
             return number, u, u
@@ -343,81 +341,3 @@ class Trials:
         distances = np.abs(self.pending - u).max(axis=1)
         nearest = int(np.argmin(distances))
         return list(self._pending)[nearest] if distances[nearest] <= ROUNDED else None
-
-    def _all(self, name: str, X: ArrayLike, inside: bool) -> NDArray[np.float64]:
-        """Return points (k, d), the unit cube being the box."""
-        none = not hasattr(X, "columns") and np.size(X) == 0
-        points = np.empty((0, self._box.dimension)) if none else self._box.points(X)
-        U = self._near(points)
-        if U.ndim != 2:
-            raise InputError(f"{name} has shape {U.shape}; give one row a trial, (t, {self._box.dimension}).")
-        sound = np.isfinite(points).all(axis=1)
-        if inside:
-            sound &= np.all((U >= 0.0) & (U <= 1.0), axis=1)
-        if not sound.all():
-            bad = points[int(np.argmin(sound))]
-            wanted = f"not inside {self._box}" if inside else "not finite"
-            raise InputError(f"{name} holds {self._box.as_dict(bad)}, which is {wanted}.")
-        return U
-
-    def _anywhere(self, name: str, x: Any) -> NDArray[np.float64]:
-        """Return the finite point x (d,), the unit cube being the box."""
-        points = self._box.points(x)
-        u = self._near(points)
-        if u.ndim != 1:
-            raise InputError(
-                f"{name} has shape {u.shape}; tell one trial at a time, of shape ({len(self._box.names)},)."
-            )
-        if not np.all(np.isfinite(points)):
-            raise InputError(f"{name} is {points.tolist()}; every coordinate must be a finite number.")
-        return u
-
-    def _near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return points of the unit cube; what lies beyond a bound by no more than rounding is on it."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            U = self._box.to_unit(points)
-            slack = self._box.rounding / self._box.widths
-            U = np.where(-slack > U, U, np.maximum(U, 0.0))
-            U = np.where(1.0 + slack < U, U, np.minimum(U, 1.0))
-            return np.clip(U, -_FARTHEST, _FARTHEST)
-
-
-def initial_inputs(box: Box, points: Any) -> NDArray[np.float64]:
-    """Return points to be tried first as points (i, d) of the unit cube; raises InputError where one lies outside."""
-    if points is None:
-        return np.empty((0, box.dimension))
-    rows = [box.points(point) for point in points] if isinstance(points, (list, tuple)) else box.points(points)
-    trials = Trials(box)
-    trials.restore(
-        np.reshape(rows, (-1, box.dimension)), np.zeros(len(rows)), np.reshape(rows, (-1, box.dimension)), ()
-    )
-    return trials.commanded
-
-
-def number_of(y: Any) -> float:
-    """Return the value of a trial as a float; raises InputError where it is not one finite number."""
-    if y is None:
-        raise InputError("the trial has no value; give y, or failed=True for a trial that gave nothing.")
-    try:
-        value = numbers_of(y)
-    except (TypeError, ValueError, OverflowError):
-        shown = " ".join(repr(y).split())
-        raise InputError(f"y is {shown}; give one finite number, or failed=True.") from None
-    if value.size != 1 or not np.isfinite(value).all():
-        raise InputError(f"y is {y!r}; give one finite number, or failed=True for a trial that gave nothing.")
-    return float(value.reshape(()))
-
-
-def told_noise(noise: Any, wanted: bool) -> float:
-    """Return the standard deviation told with a value, 0 where none is wanted; raises InputError where it is bad."""
-    if not wanted:
-        if noise is not None:
-            raise InputError("noise= goes with a value, and with an optimizer that was made with noise='told'.")
-        return 0.0
-    try:
-        value = float(numbers_of(noise).reshape(())) if noise is not None else np.nan
-    except (TypeError, ValueError, OverflowError):
-        value = np.nan
-    if not (np.isfinite(value) and value >= 0.0):
-        raise InputError(f"noise is {noise!r}; tell the standard deviation of y, a finite number of 0 or more.")
-    return value

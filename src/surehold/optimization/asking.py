@@ -1,0 +1,99 @@
+"""Where the next trial is made: of the initial design, then by the strategy, and where neither has a place left."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.optimization.assembly import Parts
+from surehold.optimization.box import Box
+from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.requirements import Requirements
+from surehold.optimization.strategy.ranking import History
+from surehold.optimization.surrogates.protocol import Posterior
+from surehold.optimization.trials import Trials, same
+
+__all__ = ["Asking", "history_of"]
+
+
+def history_of(trials: Trials, requirements: Requirements | None) -> History:
+    """Return what a strategy knows of the trials."""
+    told = trials.eligible  # those that reached a place outside of the box are no answer, as failed ones
+    admission = None
+    if requirements is not None:
+        told = requirements.feasible(trials)
+        admission = requirements.admission(trials)
+    return History(trials.places[told], trials.modelled[told], trials.reached[~told], trials.pending, admission)
+
+
+class Asking:
+    """Chooses the places of trials; which one depends on the trials, the settings and the position alone.
+
+    `conditions_measured`: whether variables that nobody sets stay at their mean in every trial asked for.
+    """
+
+    def __init__(self, box: Box, parts: Parts, conditions_measured: bool):
+        self._box: Final = box
+        self._parts: Final = parts
+        self._measured: Final = conditions_measured
+
+    def place(
+        self, trials: Trials, position: int, numbered: bool, posterior: Callable[[], Posterior]
+    ) -> NDArray[np.float64]:
+        """Return the place (d,) in the cube of the trial at this position in the design and the random sequence.
+
+        Unless it is `numbered`, places of the design that have been used are left out. `posterior` is called where it
+        is needed.
+        """
+        parts = self._parts
+        rng = np.random.default_rng([parts.seed, 2, position])
+        if position < parts.n_initial:
+            u = parts.design[position if numbered else self._unused(trials, position)]
+        elif not trials.successful.any():
+            u = self._anywhere(trials, rng)  # every trial failed or is pending: keep covering
+        else:
+            with single_threaded():
+                u = self._proposed(trials, posterior, rng)
+        u = self._snapped(u)
+        return self._box.uncontrolled.at_mean(u) if self._measured and self._box.uncontrolled is not None else u
+
+    def _unused(self, trials: Trials, position: int) -> int:
+        """Return the place in the design to ask for next: the position, or the first unused one after a `forget`."""
+        design = self._snapped(self._parts.design)
+        made = np.concatenate([trials.commanded, trials.pending])
+
+        def unused(place: int) -> bool:  # on a lattice several places may be one point
+            return int(same(design[place], made).sum()) <= int(same(design[place], design[:place]).sum())
+
+        return position if unused(position) else next(filter(unused, range(self._parts.n_initial)), position)
+
+    def _proposed(
+        self, trials: Trials, posterior: Callable[[], Posterior], rng: np.random.Generator
+    ) -> NDArray[np.float64]:
+        strategy, requirements = self._parts.strategy, self._parts.requirements
+        history = history_of(trials, requirements)
+        if len(history.tried):
+            candidates = strategy.candidates(posterior(), history, rng)
+        elif requirements is not None:
+            candidates = requirements.most_probable(trials, rng)
+        else:
+            candidates = np.empty((0, self._box.dimension))
+        candidates = self._snapped(candidates)
+        if history.admission is not None:
+            candidates = candidates[history.admission.possible(candidates)]
+        if strategy.ranking.noisy and len(candidates):
+            return candidates[0]
+        tried = np.concatenate([trials.commanded, trials.pending])
+        for candidate in candidates:
+            if np.count_nonzero(same(candidate, tried)) <= strategy.repeats:
+                return candidate
+        return self._anywhere(trials, rng)  # every candidate has been tried already
+
+    def _anywhere(self, trials: Trials, rng: np.random.Generator) -> NDArray[np.float64]:
+        if self._parts.requirements is not None:
+            return self._parts.requirements.otherwise(trials, rng)
+        return rng.random(self._box.dimension)
+
+    def _snapped(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        return U if self._parts.lattice is None else self._parts.lattice.snap(U)

@@ -1,0 +1,204 @@
+"""What an optimizer is made of, from its settings; their combinations are checked here."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.defaults import DESIGN_LEAST, DESIGN_MOST, DESIGN_PER_VARIABLE, DESIGN_VARIABLES_PER_MORE
+from surehold.errors import InputError, unknown_name
+from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.argument_kinds import check_kinds
+from surehold.optimization.box import Box
+from surehold.optimization.constraints.input import Region, region_of
+from surehold.optimization.lattice import Lattice, lattice_of
+from surehold.optimization.limits import Limit, limits_of
+from surehold.optimization.noise.input_noise import InputNoise, noise_of_coordinates
+from surehold.optimization.requirements import Requirements
+from surehold.optimization.response_model import ResponseModel, chosen_surrogate
+from surehold.optimization.strategy.initial_design import design as initial_design
+from surehold.optimization.strategy.named import strategy_named
+from surehold.optimization.strategy.protocol import Strategy
+from surehold.optimization.strategy.thesis import thesis_preset
+from surehold.optimization.strategy.trust_region import TrustRegion
+from surehold.optimization.success import check_combination
+from surehold.optimization.surrogates.named import TELLABLE
+from surehold.optimization.surrogates.protocol import NoisySurrogate
+from surehold.optimization.surrogates.success.model import SuccessProcess
+from surehold.optimization.trial_inputs import initial_inputs
+
+__all__ = ["Parts", "assembled", "default_n_initial", "whole_number"]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What an optimizer is made of."""
+
+    settings: Mapping[str, Any]
+    """as they are stored"""
+    input_noise: InputNoise | None
+    """over the coordinates of the cube"""
+    seed: int
+    n_initial: int
+    lattice: Lattice | None
+    limits: tuple[Limit, ...]
+    model: ResponseModel
+    strategy: Strategy
+    requirements: Requirements | None
+    design: NDArray[np.float64]
+    """(n_initial, d) of the unit cube"""
+
+
+def default_n_initial(box: Box, variables: int | None = None) -> int:
+    """Return the size of the initial design where none is given: 5 for each variable, at least 6, at most 20 + d/5.
+
+    `variables` are those that can vary, where the box has others.
+    """
+    d = len(box.variables) if variables is None else variables
+    return max(DESIGN_LEAST, min(DESIGN_PER_VARIABLE * d, DESIGN_MOST + d // DESIGN_VARIABLES_PER_MORE))
+
+
+def whole_number(name: str, value: int, least: int) -> int:
+    """Return the argument `name` as an int; raises InputError where it is none of `least` or more."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
+    return int(value)
+
+
+def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
+    """Return the parts of an `Optimizer` of these settings, all of its arguments but the box.
+
+    Raises InputError for unknown names, values out of range and settings that contradict each other.
+    """
+    if not isinstance(box, Box):
+        raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
+    check_kinds(settings)
+    s = SimpleNamespace(**settings)
+    _check(s)
+    if s.outcome == "success":
+        check_combination(settings)
+    seed = whole_number("seed", s.seed, 0)
+    input_noise = noise_of_coordinates(s.input_noise, box)
+    straying = input_noise if s.noise_while_exploring else None
+    first = initial_inputs(box, s.initial_points)
+    wanted = default_n_initial(box, len(box.variables) - len(s.fixed or ())) if s.n_initial is None else s.n_initial
+    wanted = whole_number("n_initial", wanted, 1)
+    n_initial = len(first) if s.safety is not None else max(wanted, len(first))
+    told = s.noise == "told"
+    thesis = None if s.preset is None else thesis_preset(s.preset)
+    surrogate = chosen_surrogate(
+        SuccessProcess() if s.outcome == "success" else s.surrogate,
+        preset=s.preset,
+        thesis=thesis,
+        noise=None if told else s.noise,
+        output_range=_turned(s.output_range) if s.direction == "minimize" else s.output_range,
+        box=box,
+        input_noise=input_noise,
+        seed=seed,
+    )
+    if input_noise is not None:
+        input_noise.warn_if_larger_than(box)
+    lattice = lattice_of(box, s.fixed)
+    region = region_of(box, s.allowed, lattice, seed, first)
+    strategy = strategy_named(
+        s.criterion,
+        Risk(s.risk) if isinstance(s.risk, str) else s.risk,
+        box,
+        input_noise,
+        quadrature=s.quadrature,
+        k=s.k,
+        border=s.border,
+        kappa=s.kappa,
+        noisy=getattr(surrogate, "noisy", False) or s.noise_while_exploring or told,
+        trust_region=TrustRegion(n_initial) if s.trust_region else None,
+        thesis=thesis,
+        allowed=None if region is None else region.contains,
+        outcome=s.outcome,
+    )
+    takes_noise = isinstance(surrogate, NoisySurrogate)
+    if s.noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):
+        raise InputError(
+            "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials "
+            "('two_scales', 'gp', 'tgp', or an object with known_noise), without a thesis preset."
+        )
+    model = ResponseModel(
+        surrogate,
+        box,
+        straying=straying,
+        lattice=lattice,
+        continues_chains=strategy.continues_chains,
+        seed=seed,
+        told=told,
+    )
+    limits = limits_of(s.constraints)
+    requirements = None
+    if _required(s, region, limits, first):
+        requirements = Requirements(
+            box,
+            region,
+            limits,
+            level=s.feasible,
+            safety=s.safety,
+            ranking=strategy.ranking,
+            straying=straying,
+            noise="inferred" if strategy.ranking.noisy and straying is None else "none",
+            lattice=lattice,
+            seed=seed,
+            failures=s.failures == "modelled",
+        )
+    rng = np.random.default_rng([seed, 0])
+    rest = initial_design(s.design, max(n_initial - len(first), 1), box.dimension, rng)
+    if requirements is not None:
+        rest = requirements.initial(rest, first, rng)
+    stored = {"initial_points": None if s.initial_points is None else box.from_unit(first).tolist()}
+    return Parts(
+        settings={**settings, **stored},
+        input_noise=input_noise,
+        seed=seed,
+        n_initial=n_initial,
+        lattice=lattice,
+        limits=limits,
+        model=model,
+        strategy=strategy,
+        requirements=requirements,
+        design=np.concatenate([first, rest]),
+    )
+
+
+def _turned(output_range: tuple[float, float] | None) -> tuple[float, float] | None:
+    return None if output_range is None else (-output_range[1], -output_range[0])
+
+
+def _check(s: SimpleNamespace) -> None:
+    for name, known in (
+        ("direction", ("maximize", "minimize")),
+        ("outcome", ("value", "success")),
+        ("conditions", ("commanded", "measured")),
+        ("failures", ("lowest", "modelled")),
+    ):
+        if getattr(s, name) not in known:
+            raise unknown_name("rule for failures" if name == "failures" else name, getattr(s, name), known)
+    if s.noise == "told" and (s.preset is not None or s.outcome == "success" or s.surrogate not in (None, *TELLABLE)):
+        raise InputError(f"noise='told' needs one of the surrogates {', '.join(TELLABLE)}, and no preset.")
+    for name in ("feasible", "safety"):
+        value = getattr(s, name)
+        if value is not None and not 0 < value < 1:
+            raise InputError(f"{name} is {value!r}; give a probability strictly between 0 and 1, such as 0.95.")
+
+
+def _required(s: SimpleNamespace, region: Region | None, limits: tuple[Limit, ...], first: NDArray[np.float64]) -> bool:
+    """Tell whether these settings require anything of trials and answers."""
+    if s.safety is not None and (all(limit.watched for limit in limits) or not len(first)):
+        raise InputError(
+            "safety= needs constraints= with a limit, and initial_points= that are known to keep all limits."
+        )
+    if region is None and not limits and s.failures == "lowest":
+        return False
+    if s.preset is not None:
+        raise InputError(
+            f"preset='{s.preset}' chooses trials as the thesis does, which knows no constraints; leave one out."
+        )
+    return True

@@ -1,0 +1,61 @@
+"""Inputs of trials as they are told, in the box's units, as points whose unit cube is the box."""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surehold.errors import InputError
+from surehold.optimization.box import Box
+
+__all__ = ["initial_inputs", "trial_input", "trial_inputs"]
+
+# A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
+# it stay finite.
+_FARTHEST: Final = 1e6
+
+
+def trial_inputs(box: Box, name: str, X: ArrayLike, inside: bool) -> NDArray[np.float64]:
+    """Return points (k, d), the unit cube being the box."""
+    none = not hasattr(X, "columns") and np.size(X) == 0
+    points = np.empty((0, box.dimension)) if none else box.points(X)
+    U = _near(box, points)
+    if U.ndim != 2:
+        raise InputError(f"{name} has shape {U.shape}; give one row a trial, (t, {box.dimension}).")
+    sound = np.isfinite(points).all(axis=1)
+    if inside:
+        sound &= np.all((U >= 0.0) & (U <= 1.0), axis=1)
+    if not sound.all():
+        bad = points[int(np.argmin(sound))]
+        wanted = f"not inside {box}" if inside else "not finite"
+        raise InputError(f"{name} holds {box.as_dict(bad)}, which is {wanted}.")
+    return U
+
+
+def trial_input(box: Box, name: str, x: Any) -> NDArray[np.float64]:
+    """Return the finite point x (d,), the unit cube being the box."""
+    points = box.points(x)
+    u = _near(box, points)
+    if u.ndim != 1:
+        raise InputError(f"{name} has shape {u.shape}; tell one trial at a time, of shape ({len(box.names)},).")
+    if not np.all(np.isfinite(points)):
+        raise InputError(f"{name} is {points.tolist()}; every coordinate must be a finite number.")
+    return u
+
+
+def _near(box: Box, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points of the unit cube; what lies beyond a bound by no more than rounding is on it."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        U = box.to_unit(points)
+        slack = box.rounding / box.widths
+        U = np.where(-slack > U, U, np.maximum(U, 0.0))
+        U = np.where(1.0 + slack < U, U, np.minimum(U, 1.0))
+        return np.clip(U, -_FARTHEST, _FARTHEST)
+
+
+def initial_inputs(box: Box, points: Any) -> NDArray[np.float64]:
+    """Return points to be tried first as points (i, d) of the unit cube; raises InputError where one lies outside."""
+    if points is None:
+        return np.empty((0, box.dimension))
+    rows = [box.points(point) for point in points] if isinstance(points, (list, tuple)) else box.points(points)
+    return trial_inputs(box, "initial_points", np.reshape(rows, (-1, box.dimension)), inside=True)
