@@ -52,7 +52,7 @@ def test_touches_move_the_surface_of_a_cloud(here):
     assert abs(touched.value(place)[0]) < 0.2 * abs(plain.value(place)[0])
     assert touched.deviation(place)[0] < 0.001 < plain.deviation(place)[0]
     (here / "touches.json").write_text(json.dumps({"contacts": [{"point": [30.0, 0, 50.0], "normal": [1, 0, 0]}]}))
-    with pytest.raises(InputError, match="off the cloud's surface"):
+    with pytest.raises(InputError, match="give meters"):
         belief_of_file({**words, "contacts": "touches.json"})
 
 
@@ -63,6 +63,7 @@ def test_an_exploration(here, capsys):
     found = json.loads((here / "touched" / "explore.json").read_text())
     assert len(found["trials"]["quality"]) == 2
     assert [row["touches"] for row in found["after"]] == ["0", "2"]
+    assert found["after"][0]["best trial"] == "none yet"
     page = (here / "touched" / "explore.html").read_text()
     assert "true shape" in page
     assert (here / "touched" / "shape.png").read_bytes().startswith(b"\x89PNG")

@@ -196,7 +196,9 @@ class _Run:
         self.notes.append(text)
         shown = (error.mean(), np.quantile(error, 0.95), 1e3 * deviation.mean())
         worth = (self.answer.mean, true, tried)
-        self.rows.append((str(n), *(f"{v:.1f}" for v in shown), *(f"{v:.3f}" for v in worth)))
+        self.rows.append(
+            (str(n), *(f"{v:.1f}" for v in shown), *("none yet" if np.isnan(v) else f"{v:.3f}" for v in worth))
+        )
         return text
 
     def write(self, folder: Path) -> Path:
