@@ -7,7 +7,7 @@ shape    distance of the true surface to the one believed [mm], mean and 95 %, o
          chosen on these
 grasp    a grasp is planned on a half view (1,000 points, 1 mm): on 8 draws of the shape, on the mean surface alone, and
          on the cloud mirrored and believed; then it is queried 200 times on the true shape under input noise
-explore  from a box: the true worth of the recommendation after 20, 35 and 50 trials, beside optimization without a shape
+explore  from a box: the true worth of the answer after 20, 35 and 50 trials, beside optimization without a shape
 time     of an update of the shape with 200 contacts
 
 Every finished case is a line of the rows' file: a benchmark that is stopped goes on where it was. Cases are numbered by
