@@ -52,7 +52,7 @@ def test_touches_move_the_surface_of_a_cloud(here):
     assert abs(touched.value(place)[0]) < 0.2 * abs(plain.value(place)[0])
     assert touched.deviation(place)[0] < 0.001 < plain.deviation(place)[0]
     (here / "touches.json").write_text(json.dumps({"contacts": [{"point": [30.0, 0, 50.0], "normal": [1, 0, 0]}]}))
-    with pytest.raises(InputError, match="off the cloud's surface"):
+    with pytest.raises(InputError, match="give meters"):
         belief_of_file({**words, "contacts": "touches.json"})
 
 
@@ -63,6 +63,7 @@ def test_an_exploration(here, capsys):
     found = json.loads((here / "touched" / "explore.json").read_text())
     assert len(found["trials"]["quality"]) == 2
     assert [row["touches"] for row in found["after"]] == ["0", "2"]
+    assert found["after"][0]["best trial"] == "none yet"
     page = (here / "touched" / "explore.html").read_text()
     assert "true shape" in page
     assert (here / "touched" / "shape.png").read_bytes().startswith(b"\x89PNG")
@@ -87,6 +88,11 @@ def test_an_exploration(here, capsys):
         ("explore mug --trials 0", "--trials is 0"),
         ("explore mug --noise none", "--noise is none"),
         ("explore mug --cloud bottle.npz", "leave --cloud out"),
+        ("explore", "no object is given"),
+        ("explore --study cup", "takes one of --box x,y,z and --cloud"),
+        ("explore mug --box 0.1,0.1,0.1 --study cup", "and no object"),
+        ("explore --box 0.1,0.1 --study cup", "three edges"),
+        ("explore --box 80,60,120 --study cup", "in meters"),
     ],
 )
 def test_bad_input_is_one_line(line, said, capsys):
@@ -94,3 +100,110 @@ def test_bad_input_is_one_line(line, said, capsys):
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
+
+
+def test_a_robot_tells_contacts_and_the_next_trial_follows_from_them(here, capsys):
+    made = surehold("explore --box 0.06,0.06,0.2 --study cup --variables dx,dy --facet right-front --seed 3")
+    assert made == 0
+    assert "study tell cup" in capsys.readouterr().out
+
+    def asked():
+        capsys.readouterr()
+        assert surehold("study ask cup --worker arm --json") == 0
+        return json.loads(capsys.readouterr().out)
+
+    first = asked()
+    assert sorted(first["parameters"]) == ["dx", "dy"]
+    assert len(first["pose"]["position"]) == 3
+    rows = [{"point": [0.02, 0.0, z], "normal": [1.0, 0.0, 0.0]} for z in (-0.05, 0.0, 0.05)]  # 10 mm inside the box
+    (here / "touched.json").write_text(json.dumps({"contacts": rows}))
+    assert surehold("study tell cup 0 0.4 --contacts touched.json") == 0
+    from surehold.studies.robot import RobotStudy
+
+    study = RobotStudy.open("cup")
+    surface = study._touched._told(study.trials(), study.settings.space).belief.surface
+    assert np.abs(surface.value(np.array([[0.02, 0.0, 0.0]]))[0]) < 0.001
+    with_contacts = asked()["parameters"]
+    assert surehold("explore --box 0.06,0.06,0.2 --study same --variables dx,dy --facet right-front --seed 3") == 0
+    assert surehold("study ask same --json") == 0
+    assert surehold("study tell same 0 0.4") == 0
+    without = RobotStudy.open("same").next()
+    assert with_contacts != without
+    # The same answer again is harmless, another one is refused.
+    assert surehold("study tell cup 0 0.4 --contacts touched.json") == 0
+    (here / "touched.json").write_text(json.dumps({"contacts": rows[:1]}))
+    assert surehold("study tell cup 0 0.4 --contacts touched.json") == 2
+    assert "with other contacts" in capsys.readouterr().err
+    capsys.readouterr()
+    assert surehold("study recommend cup --json") == 0
+    assert json.loads(capsys.readouterr().out)["trial"] == 0
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({"contacts": []}, "hold 0 touches"),
+        ({"contacts": [{"point": [0.03, 0, 0], "normal": [2, 0, 0]}]}, "unit normals"),
+        ({"contacts": [{"point": [30.0, 0, 50.0], "normal": [1, 0, 0]}]}, "give meters"),
+        ({"contacts": [{"point": [0.4, 0, 0], "normal": [1, 0, 0]}]}, "mm off the surface"),
+        (
+            {"contacts": [{"point": [0.03, 0, 0], "normal": [v, 0, 0]} for v in (1, -1)]},
+            "normals 180 degrees",
+        ),
+        ({"contacts": [{"point": [0.03, 0], "normal": [1, 0, 0]}]}, "not read"),
+        ({"touches": 3}, "not read ('contacts')"),
+    ],
+)
+def test_contacts_that_cannot_be_are_refused_in_one_line(here, capsys, told, said):
+    assert surehold("explore --box 0.06,0.06,0.2 --study cup --variables dx,dy --facet right-front") == 0
+    assert surehold("study ask cup --json") == 0
+    (here / "touched.json").write_text(json.dumps(told))
+    capsys.readouterr()
+    assert surehold("study tell cup 0 0.4 --contacts touched.json") == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_contacts_are_for_studies_of_a_shape(here, capsys):
+    assert surehold("study create rig --parameters x=0:1") == 0
+    assert surehold("study ask rig --json") == 0
+    (here / "touched.json").write_text(json.dumps({"contacts": [{"point": [0, 0, 0], "normal": [1, 0, 0]}]}))
+    capsys.readouterr()
+    assert surehold("study tell rig 0 0.4 --contacts touched.json") == 2
+    assert "not about a shape that is touched" in capsys.readouterr().err
+
+
+def test_contacts_come_over_http_as_well(here):
+    from fastapi.testclient import TestClient
+
+    from surehold.studies.robot import RobotStudy
+    from surehold.studies.service import new_token, service
+
+    assert surehold("explore --box 0.06,0.06,0.2 --study cup --variables dx,dy --facet right-front") == 0
+    study, token = RobotStudy.open("cup"), new_token()
+    client = TestClient(service(study, token), base_url="http://127.0.0.1/studies/cup")
+    client.headers["Authorization"] = f"Bearer {token}"
+    asked = client.post("/ask", json={}).json()
+    assert len(asked["pose"]["quaternion"]) == 4
+    touches = {"contacts": [{"point": [0.02, 0.0, 0.0], "normal": [1.0, 0.0, 0.0]}], "free": [[0.05, 0.0, 0.0, 0.01]]}
+    answer = {"id": asked["id"], "value": 0.4, "touches": touches}
+    assert client.post("/tell", json=answer).json()["state"] == "complete"
+    assert study.trials()[0].user_attrs["surehold:contacts"] == touches
+    wrong = {"id": asked["id"], "value": 0.4, "touches": {"contacts": [{"point": [0.02, 0.0], "normal": [1, 0, 0]}]}}
+    assert client.post("/tell", json=wrong).status_code == 422
+
+
+def test_an_unseen_side_under_the_contacts_is_said(here):
+    from surehold.cli.grasp import known_at
+    from surehold.problems.grasp.from_cloud import object_of_cloud
+    from surehold.problems.grasp.options import checked_words
+    from surehold.problems.grasp.problem import GraspProblem
+
+    body = object_of_cloud(checked_words({"object": "", "cloud": "bottle.npz", "shapes": 3}))[0]
+    with np.load("bottle.npz") as file:
+        seen, camera = file["points"], file["camera"]
+    problem = GraspProblem(shipped_object("bottle")).on(body)
+    assert "scan it" not in known_at(problem, seen[:20])["shape at the contacts"]
+    far = body.vertices[np.argsort(-np.linalg.norm(body.vertices - camera, axis=1))[:20]]
+    assert "scan it" in known_at(problem, far)["shape at the contacts"]

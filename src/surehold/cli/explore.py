@@ -11,6 +11,7 @@ import typer
 
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.options import Noise, Open, Out, Seed, noise_of
+from surehold.cli.study_options import Storage
 from surehold.errors import InputError, unknown_name
 
 __all__ = ["explore"]
@@ -23,18 +24,26 @@ _MOST_TRIALS = 500
 
 @takes_grasp_options
 def explore(
-    obj: Annotated[str, typer.Argument(metavar="OBJECT", help="mug, bottle, glass, drill, or a mesh file.")],
+    obj: Annotated[str, typer.Argument(metavar="[OBJECT]", help="mug, bottle, glass, drill, or a mesh file.")] = "",
     trials: Annotated[int, typer.Option(help="Touches.")] = 20,
     start: Annotated[str, typer.Option(help="What is known first: box, or view (of a camera, 1000 points).")] = "box",
     goal: Annotated[str, typer.Option(help="grasp: find a safe one; shape: know the shape.")] = "grasp",
     probe: Annotated[bool, typer.Option("--probe", help="End a trial at the first contact.")] = False,
     noise: Noise = "0.03",
     seed: Seed = 0,
+    box: Annotated[
+        str, typer.Option(help="Of --study: edges of the object's box, x,y,z [m].", show_default=False)
+    ] = "",
+    study: Annotated[
+        str,
+        typer.Option(help="Create this study, whose trials a robot makes, of --box or --cloud.", show_default=False),
+    ] = "",
+    storage: Storage = "",
     out: Out = "",
     open_page: Open = False,
     **options: Any,
 ) -> None:
-    """Touch an object whose shape is not known, learn it, and end with a grasp: in simulation."""
+    """Touch an object whose shape is not known, learn it, and end with a grasp: in simulation, or with a robot."""
     from surehold.cli.compilation import announced
     from surehold.cli.terminal import terminal
     from surehold.problems.grasp.exploration import GOALS
@@ -46,14 +55,23 @@ def explore(
         raise unknown_name("start", start, _STARTS)
     if goal not in GOALS:
         raise unknown_name("goal", goal, GOALS)
-    if options["cloud"]:
-        raise InputError("explore touches a known object in simulation; leave --cloud out and give --start view.")
+    if (options["cloud"] or box) and not study:
+        given = "--cloud" if options["cloud"] else "--box"
+        raise InputError(
+            f"explore touches a known object in simulation; leave {given} out and give --start view, or name a --study "
+            "whose trials a robot makes."
+        )
     input_noise = noise_of(noise or "none", "bo")
     if input_noise is None:
         raise InputError("--noise is none; give what the hand strays, such as 0.03.")
     names = [name.strip() for name in options["variables"].split(",") if name.strip()]
     console = terminal()
     described = {"object": obj, **options, "variables": names}
+    if study:
+        console.print(_created(study, storage, described, box, goal, input_noise, seed), markup=False, soft_wrap=True)
+        return
+    if not obj:
+        raise InputError("no object is given; name one to touch in simulation, or a --study with --box or --cloud.")
     body = object_of(described, console)
     folder = checked_folder(out or Path("runs") / f"explore-{body.name}-seed{seed}")
     with announced(console):
@@ -78,6 +96,37 @@ def explore(
     console.print(f"Page: {path}", markup=False, soft_wrap=True)
     if open_page:
         webbrowser.open(path.resolve().as_uri())
+
+
+def _created(study: str, storage: str, described: dict[str, Any], box: str, goal: str, noise: Any, seed: int) -> str:
+    """Create a study of an unknown shape, and return what to do next."""
+    from surehold.cli.study_options import quiet
+    from surehold.studies.robot import RobotStudy
+    from surehold.studies.search_space import SearchSpace
+    from surehold.studies.settings import StudySettings
+    from surehold.studies.touch import TouchedShape
+
+    if described["object"] or bool(box) == bool(described["cloud"]):
+        raise InputError("a study of an unknown shape takes one of --box x,y,z and --cloud FILE, and no object.")
+    words: dict[str, Any] = {**described, "goal": goal}
+    if box:
+        try:
+            words["box"] = [float(word) for word in box.split(",")]
+        except ValueError:
+            raise InputError(f"--box is {box!r}; give three edges x,y,z in meters, such as 0.08,0.06,0.12.") from None
+    else:
+        words["cloud"] = str(Path(words["cloud"]).resolve())
+    quiet()
+    problem = TouchedShape(words, noise, seed).problem
+    words["facet"] = problem.facet
+    units = dict(zip(problem.box.names, problem.units, strict=True))
+    made = RobotStudy.create(
+        study, StudySettings(SearchSpace(problem.box), noise, units, {"seed": seed}, {"touch": words}), storage
+    )
+    return (
+        f"Created study {study} in {made.storage.shown}. Ask for a trial: surehold study ask {study} --json; tell what "
+        f"it gave and touched: surehold study tell {study} ID VALUE --contacts FILE.json."
+    )
 
 
 class _Run:
@@ -147,7 +196,9 @@ class _Run:
         self.notes.append(text)
         shown = (error.mean(), np.quantile(error, 0.95), 1e3 * deviation.mean())
         worth = (self.answer.mean, true, tried)
-        self.rows.append((str(n), *(f"{v:.1f}" for v in shown), *(f"{v:.3f}" for v in worth)))
+        self.rows.append(
+            (str(n), *(f"{v:.1f}" for v in shown), *("none yet" if np.isnan(v) else f"{v:.3f}" for v in worth))
+        )
         return text
 
     def write(self, folder: Path) -> Path:

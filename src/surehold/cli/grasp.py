@@ -30,6 +30,7 @@ from surehold.errors import unknown_name
 
 __all__ = ["Outcomes", "grasp"]
 
+_UNSEEN = 0.004  # m; deviation of a surface that counts as not seen
 _PRESETS = ("thesis", "thesis-grasp")  # both with the simulator of the thesis
 
 
@@ -131,6 +132,7 @@ def grasp(
             pose=f"palm at ({position}) mm, quaternion ({turn}), {posture_text(outcome.s1)}",
             details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
             | losses(problem, candidate.x, input_noise, seed)
+            | known_at(problem, outcome.contacts.points)
             | physics,
             scene=replace(drawn(problem, outcome), neighbors=neighbors_of(problem, candidate)),
         )
@@ -218,6 +220,16 @@ def losses(problem: Any, x: Any, noise: Any, seed: int) -> dict[str, str]:
         "lost to the unknown shape": f"{loss.shape:.3f}",
         "left under both": f"{loss.robust:.3f}",
     }
+
+
+def known_at(problem: Any, points: Any) -> dict[str, str]:
+    """Return how well an unknown shape is known at the contacts (c, 3) of a grasp, and what to do if it is not."""
+    if not problem.object.draws or not len(points):
+        return {}
+    off = np.stack([draw.distances.distance(points) for draw in problem.object.draws])
+    deviation = float(np.sqrt(np.mean(off**2)))
+    advice = "; this side was not seen: scan it, or touch it and give --contacts" if deviation > _UNSEEN else ""
+    return {"shape at the contacts": f"known to {1e3 * deviation:.1f} mm{advice}"}
 
 
 def neighbors_of(problem: Any, candidate: Any) -> Any:

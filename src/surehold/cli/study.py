@@ -125,6 +125,7 @@ def ask(
             )
         raise
     found = {"id": asked.id, "parameters": asked.parameters, "units": asked.units, "again": asked.again}
+    found |= {} if asked.pose is None else {"pose": asked.pose}
     lines = [f"trial {asked.id}{' (handed out again)' * asked.again}"]
     lines += [f"  {key} = {value} {asked.units.get(key, '')}".rstrip() for key, value in asked.parameters.items()]
     say(found, "\n".join(lines), as_json)
@@ -142,6 +143,14 @@ def tell(
         str, typer.Option(help="What was truly reached, where it differs: NAME=VALUE,...", show_default=False)
     ] = "",
     constraints: Outputs = "",
+    contacts: Annotated[
+        str,
+        typer.Option(
+            help="JSON file, {contacts: [{point, normal}, ..]} in the object's frame [m]: what the hand touched, of a "
+            "study made by explore --study.",
+            show_default=False,
+        ),
+    ] = "",
     storage: Storage = "",
     as_json: Json = False,
 ) -> None:
@@ -151,7 +160,13 @@ def tell(
 
     places = parse_assignments(reached, "--reached") if reached else None
     outputs = numbers_given(constraints)
-    told = opened(name, storage).tell(id, value, failed=failed, reached=places, constraints=outputs)
+    touched = None
+    if contacts:
+        from surehold.problems.grasp.told_contacts import contact_rows
+
+        touched = contact_rows(contacts)
+    study = opened(name, storage)
+    told = study.tell(id, value, failed=failed, reached=places, constraints=outputs, contacts=touched)
     outcome = "failed" if told.value is None else f"value {told.value!r}"
     found = {"id": told.id, "state": told.state, "value": told.value, "already": told.already}
     say(found, f"trial {told.id}: {outcome}{', as told before' * told.already}", as_json)

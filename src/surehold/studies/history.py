@@ -19,12 +19,14 @@ from optuna.trial import FrozenTrial, TrialState
 
 from surehold.studies.search_space import SearchSpace
 
-__all__ = ["OUTPUTS", "REACHED", "History", "history_of", "parameters_of"]
+__all__ = ["CONTACTS", "OUTPUTS", "REACHED", "History", "history_of", "parameters_of"]
 
 #: Trial attribute that holds the parameters that were truly reached.
 REACHED: Final = "surehold:reached"
 #: Trial attribute that holds the further outputs; an attribute of an output's own name does, too.
 OUTPUTS: Final = "surehold:outputs"
+#: Trial attribute that holds what a hand touched, as problems/grasp/told_contacts.py describes it.
+CONTACTS: Final = "surehold:contacts"
 
 
 class History(NamedTuple):

@@ -12,7 +12,7 @@ from optuna.storages import BaseStorage
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from surehold.errors import InputError
-from surehold.studies.history import OUTPUTS, REACHED
+from surehold.studies.history import CONTACTS, OUTPUTS, REACHED
 from surehold.studies.search_space import SearchSpace
 
 __all__ = [
@@ -145,6 +145,7 @@ class Ledger:
         failed: bool,
         reached: Mapping[str, Any] | None,
         outputs: Mapping[str, float] | None = None,
+        contacts: Mapping[str, Any] | None = None,
     ) -> Told:
         """Store an answer; see `RobotStudy.tell`."""
         number = checked_value(value, failed)
@@ -159,6 +160,8 @@ class Ledger:
                     self._backend.set_trial_user_attr(trial._trial_id, REACHED, actual or trial.params)
                 if outputs or OUTPUTS in trial.user_attrs:
                     self._backend.set_trial_user_attr(trial._trial_id, OUTPUTS, dict(outputs or {}))
+                if contacts is not None or CONTACTS in trial.user_attrs:
+                    self._backend.set_trial_user_attr(trial._trial_id, CONTACTS, contacts)
                 if number is None:
                     self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
                 else:
@@ -170,8 +173,10 @@ class Ledger:
         now = "failed" if number is None else f"value {number!r}"
         elsewhere = actual is not None and actual != trial.user_attrs.get(REACHED, trial.params)
         otherwise = bool(outputs) and outputs != trial.user_attrs.get(OUTPUTS, {})
-        if before != now or elsewhere or otherwise:
+        touched = contacts is not None and contacts != trial.user_attrs.get(CONTACTS)
+        if before != now or elsewhere or otherwise or touched:
             differing = ", reached elsewhere" * elsewhere + ", with other outputs" * otherwise
+            differing += ", with other contacts" * touched
             raise AnswerRefused(
                 f"trial {id} was told before: {before}; now: {now}{differing}. The first "
                 "answer counts; add the other one as a trial of its own if it was made."

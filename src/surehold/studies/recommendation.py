@@ -16,7 +16,7 @@ from surehold.studies.dashboard_note import read_note, write_note
 from surehold.studies.history import REACHED, history_of
 from surehold.studies.sampler import Sampler, direction_of
 
-__all__ = ["RECOMMENDATION", "StudyRecommendation", "recommend"]
+__all__ = ["RECOMMENDATION", "StudyRecommendation", "find_recommendation", "recommend", "written"]
 
 #: Study attribute that holds the recommendation last written.
 RECOMMENDATION: Final = "surehold:recommendation"
@@ -77,7 +77,11 @@ def recommend(study: Study, sampler: Sampler | None = None) -> StudyRecommendati
     InputError
         If the sampler is not surehold's, the study has several objectives, or no trial has given a value yet.
     """
-    found = find_recommendation(study, sampler)
+    return written(study, find_recommendation(study, sampler))
+
+
+def written(study: Study, found: StudyRecommendation) -> StudyRecommendation:
+    """Write a recommendation into a study, as attribute and note, and return it."""
     if study.user_attrs.get(RECOMMENDATION) != found.as_dict():
         study.set_user_attr(RECOMMENDATION, found.as_dict())
     backend, study_id = study._storage, study._study_id

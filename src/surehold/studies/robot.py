@@ -8,7 +8,8 @@ believed dead, is accepted as long as the one that took the trial up again has n
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import optuna
@@ -19,11 +20,14 @@ from surehold.errors import InputError, SureholdError
 from surehold.optimization.limits import checked_outputs, limits_of
 from surehold.studies.history import OUTPUTS, REACHED, history_of, parameters_of
 from surehold.studies.ledger import HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
-from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend
+from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend, written
 from surehold.studies.settings import SETTINGS, StudySettings
 from surehold.studies.stop_rule import StopRule
 from surehold.studies.storage import Storage, checked_name, open_storage
 from surehold.studies.success import answer
+
+if TYPE_CHECKING:
+    from surehold.studies.touch import TouchedShape
 
 __all__ = ["Asked", "NothingToAsk", "RobotStudy"]
 
@@ -50,6 +54,8 @@ class Asked:
     """unit of each parameter that has one"""
     again: bool
     """whether it has been handed out before"""
+    pose: dict[str, Any] | None = None
+    """of the palm in the object's frame, where the study is about a shape that is touched"""
 
 
 class RobotStudy:
@@ -74,6 +80,16 @@ class RobotStudy:
         study.sampler = self.sampler
         self.limits: Final = limits_of(settings.optimizer.get("constraints"))
         self._ledger: Final = Ledger(storage.backend, name, settings.space)
+
+    @cached_property
+    def _touched(self) -> "TouchedShape | None":
+        """What is known of the shape that this study is about, if it is."""
+        words = self.settings.problem.get("touch")
+        if words is None:
+            return None
+        from surehold.studies.touch import TouchedShape
+
+        return TouchedShape(words, self.settings.input_noise, int(self.settings.optimizer.get("seed", 0)))
 
     @classmethod
     def create(cls, name: str, settings: StudySettings, storage: str = "", *, resume: bool = False) -> "RobotStudy":
@@ -179,7 +195,7 @@ class RobotStudy:
                 trial = self._ledger.trial(self.study.ask(self.settings.space.distributions).number)
                 self._ledger.hold(trial, holder)
             else:
-                parameters = self.sampler.suggest(trials, len(trials), self.settings.direction)
+                parameters = self._suggested(trials)
                 marks = {HOLDER: holder} | ({} if promise is None else {PROMISE: promise})
                 trial = self._ledger.store(TrialState.RUNNING, parameters, marks)
             return self._asked(trial, False)
@@ -196,7 +212,7 @@ class RobotStudy:
             for trial in trials:
                 if trial.state == TrialState.WAITING and self.settings.space.contains(parameters_of(trial)):
                     return parameters_of(trial)
-            return self.sampler.suggest(trials, len(trials), self.settings.direction)
+            return self._suggested(trials)
 
     def promise(self) -> float | None:
         """Return the improvement that a further trial is expected to bring; None during the initial design."""
@@ -213,6 +229,7 @@ class RobotStudy:
         failed: bool = False,
         reached: Mapping[str, Any] | None = None,
         constraints: Mapping[str, Any] | None = None,
+        contacts: Mapping[str, Any] | None = None,
     ) -> Told:
         """Take the answer to a trial: its value, or that it gave nothing.
 
@@ -228,17 +245,27 @@ class RobotStudy:
             The parameters that were truly reached, all of them or those that differ; they may lie outside the ranges.
         constraints
             Further outputs, as in `Optimizer.tell`.
+        contacts
+            What the hand touched, of a study about an unknown shape:
+            `{"contacts": [{"point": [x, y, z], "normal": [x, y, z]}, ...], "free": [[x, y, z, radius], ...]}` in the
+            object's frame [m], normals outward; `free` is space without the object, and may be left out.
 
         Raises
         ------
         InputError
-            If there is no such trial, the value or what was reached is not finite, or the trial was told something else
-            before. What was told before stays.
+            If there is no such trial, contacts are refused, the value or what was reached is not finite, or the trial
+            was told something else before. What was told before stays.
         """
         with self.storage.failures():
-            return self._ledger.tell(
-                id, answer(self.settings.optimizer, value), failed, reached, self._checked(constraints, failed)
-            )
+            if contacts is not None:
+                if self._touched is None:
+                    raise InputError(
+                        f"study '{self.name}' is not about a shape that is touched; leave contacts out, or create one "
+                        "with: surehold explore --box x,y,z --study NAME."
+                    )
+                contacts = self._touched.checked(contacts, self._ledger.trials())
+            outputs = self._checked(constraints, failed)
+            return self._ledger.tell(id, answer(self.settings.optimizer, value), failed, reached, outputs, contacts)
 
     def _checked(self, constraints: Mapping[str, Any] | None, failed: bool) -> dict[str, float]:
         values = checked_outputs(self.limits, constraints, failed)
@@ -317,6 +344,9 @@ class RobotStudy:
     def recommend(self, *, write: bool = True) -> StudyRecommendation:
         """Return the safe answer, and write it into the study; see `surehold.studies.recommend`."""
         with self.storage.failures():
+            if self._touched is not None:
+                found = self._touched.recommend(self._ledger.trials(), self.settings.space)
+                return written(self.study, found) if write else found
             return (recommend if write else find_recommendation)(self.study, self.sampler)
 
     def trials(self) -> list[FrozenTrial]:
@@ -344,7 +374,14 @@ class RobotStudy:
         promised = [t.user_attrs[PROMISE] for t in trials if PROMISE in t.user_attrs]
         return rule.reason(begun, now, [*promised, promise]), promise
 
+    def _suggested(self, trials: list[FrozenTrial]) -> dict[str, Any]:
+        if self._touched is not None:
+            return self._touched.suggest(trials, self.settings.space)
+        return self.sampler.suggest(trials, len(trials), self.settings.direction)
+
     def _promise(self, trials: list[FrozenTrial]) -> float | None:
+        if self._touched is not None:
+            return None
         history = history_of(trials, self.settings.space, outputs=self.sampler.outputs)
         if len(trials) < self.n_initial or not np.isfinite(history.y).any():
             return None
@@ -353,4 +390,5 @@ class RobotStudy:
 
     def _asked(self, trial: FrozenTrial, again: bool) -> Asked:
         parameters = {name: trial.params[name] for name in self.settings.space.distributions}
-        return Asked(trial.number, parameters, dict(self.settings.units), again)
+        pose = None if self._touched is None else self._touched.pose(parameters)
+        return Asked(trial.number, parameters, dict(self.settings.units), again, pose)

@@ -128,13 +128,20 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
     def ask(question: wire.Question) -> wire.AskedTrial:
         """Hand out the next trial."""
         asked = study.ask(question.worker)
-        return wire.AskedTrial(id=asked.id, parameters=asked.parameters, units=asked.units, again=asked.again)
+        return wire.AskedTrial(
+            id=asked.id, parameters=asked.parameters, units=asked.units, again=asked.again, pose=asked.pose
+        )
 
     @app.post("/studies/{name}/tell", **protected)
     def tell(answer: wire.Answer) -> wire.Taken:
         """Take what came of a trial; the same answer twice is harmless."""
         told = study.tell(
-            answer.id, answer.value, failed=answer.failed, reached=answer.reached, constraints=answer.constraints
+            answer.id,
+            answer.value,
+            failed=answer.failed,
+            reached=answer.reached,
+            constraints=answer.constraints,
+            contacts=None if answer.touches is None else answer.touches.model_dump(),
         )
         return wire.Taken(id=told.id, state=told.state, value=told.value, already=told.already)
 

@@ -48,6 +48,23 @@ class Question(_Request):
     ] = None
 
 
+class TouchPoint(_Request):
+    """Where a hand touched."""
+
+    point: Annotated[list[_Finite], Field(min_length=3, max_length=3, description="In the object's frame, m.")]
+    normal: Annotated[list[_Finite], Field(min_length=3, max_length=3, description="Unit length, out of the object.")]
+
+
+class Touches(_Request):
+    """What a trial told of the shape."""
+
+    contacts: Annotated[list[TouchPoint], Field(max_length=2000)]
+    free: Annotated[
+        list[Annotated[list[_Finite], Field(min_length=4, max_length=4)]],
+        Field(max_length=2000, description="x, y, z, radius: space without the object."),
+    ] = Field(default_factory=list)
+
+
 class Answer(_Request):
     """What came of a trial."""
 
@@ -56,6 +73,7 @@ class Answer(_Request):
     failed: bool = False
     reached: Annotated[_Parameters | None, Field(description="What was truly reached, where it differs.")] = None
     constraints: _Outputs = None
+    touches: Annotated[Touches | None, Field(description="Of a study about an unknown shape.")] = None
 
 
 class Addition(_Request):
@@ -88,6 +106,7 @@ class AskedTrial(BaseModel):
     parameters: dict[str, Any]
     units: dict[str, str]
     again: bool
+    pose: dict[str, Any] | None = None
 
 
 class Taken(BaseModel):

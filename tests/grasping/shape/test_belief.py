@@ -27,7 +27,7 @@ def test_draws_have_mean_and_deviation_of_the_posterior(belief):
     grid = Grid(np.full(3, -0.03), 0.02, (3, 3, 3))
     values = ShapeBelief(belief.surface, grid).values(3000, np.random.default_rng(1)).reshape(3001, -1)
     mean, std = belief.surface.value(grid.nodes), belief.surface.deviation(grid.nodes)
-    assert values[0] == pytest.approx(mean, abs=1e-12)
+    assert values[0] == pytest.approx(mean, abs=2e-6)  # single precision
     draws = values[1:]
     # 400 waves share their frequencies: the kernel itself is off by about 1 / sqrt(400).
     assert np.abs(draws.mean(axis=0) - mean).max() < 0.1 * std.max()
@@ -54,8 +54,8 @@ def test_draws_follow_from_the_generator_alone(belief):
 def test_values_between_coarse_nodes_are_those_of_all_nodes_near_the_surface(belief):
     values = belief.values()[0]
     exact = belief.surface.value(belief.grid.nodes).reshape(values.shape)
-    near = np.abs(exact) < 2.0 * belief.grid.cell
-    assert values[near] == pytest.approx(exact[near], abs=1e-9)
+    near = np.abs(exact) < 1.5 * belief.grid.cell
+    assert values[near] == pytest.approx(exact[near], abs=2e-6)
     assert np.array_equal(values < 0.0, exact < 0.0)
 
 

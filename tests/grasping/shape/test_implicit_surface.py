@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from surehold.grasping.shape.implicit_surface import Observations, learnt_scales, spaced, surface_of
-from surehold.grasping.shape.kernel import covariance, cross_covariance
+from surehold.grasping.shape.kernel import covariance, cross_covariance, fast_function_values, function_values
 from surehold.grasping.shape.prior import PriorShape
 
 PRIOR = PriorShape("ellipsoid", np.zeros(3), np.eye(3), np.array([0.045, 0.035, 0.05]))
@@ -97,6 +97,18 @@ def test_a_box_is_recovered_from_a_wrong_prior():
     inner = np.sum(np.abs(others) > half - 0.006, axis=1) == 1  # 6 mm off the edges
     assert off[inner].mean() < 2e-4
     assert np.quantile(off, 0.95) < 1.5e-3
+
+
+def test_single_precision_is_off_by_micrometers():
+    rng = np.random.default_rng(3)
+    surface = surface_of(PRIOR, sphere(300, slopes=60), 0.01, 0.03)
+    x = rng.uniform(-0.06, 0.06, (300, 3))
+    known = surface.observations
+    rest = (known.points, known.slope_points, surface.alpha, surface.beta, surface.std, surface.length)
+    assert fast_function_values(x, *rest) == pytest.approx(function_values(x, *rest), abs=1e-5)
+    assert surface.fast_value(x) == pytest.approx(surface.value(x), abs=1e-5)
+    nothing = surface_of(PRIOR, Observations(), 0.01, 0.03)
+    assert np.array_equal(nothing.fast_value(x), PRIOR.value(x))
 
 
 def test_a_bound_acts_only_where_it_is_broken():

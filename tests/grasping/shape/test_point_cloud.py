@@ -84,6 +84,11 @@ def test_what_no_shape_can_be_learnt_from_is_said_in_one_line(mug, change, said)
     assert "\n" not in str(error.value)
 
 
+def test_a_camera_among_the_points_is_refused(mug):
+    with pytest.raises(InputError, match="lies among the points"):
+        cleaned(mug, camera=mug.mean(axis=0))
+
+
 def test_millions_of_points_are_read_in_part():
     many = surface_points(shipped_object("mug"), 1_000_000, np.random.default_rng(4))[0]
     cloud = cleaned(many)

@@ -12,7 +12,8 @@ from surehold.grasping.simulator import Simulator
 from surehold.problems.grasp.exploration import Exploration, belief_of_box
 from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.grasp.shape_loss import shape_loss
-from surehold.problems.grasp.touch import contacts_of_file, touch_trial
+from surehold.problems.grasp.told_contacts import contacts_of_file
+from surehold.problems.grasp.touch import touch_trial
 
 NOISE = sh.InputNoise.unit(0.03)
 BOTTLE = shipped_object("bottle")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from surehold.errors import InputError
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.shape.implicit_surface import ImplicitSurface
-from surehold.grasping.shape.kernel import function_values
+from surehold.grasping.shape.kernel import fast_function_values
 from surehold.grasping.shape.level_set import Grid, distances_of, grid_around, level_set_mesh, one_piece
 
 __all__ = ["DENSITY", "ShapeBelief", "grid_of"]
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 DENSITY: Final = 1000.0  #: of an object whose mass is not given [kg/m^3]
 _FEATURES: Final = 400  #: F
-_BAND: Final = 3.0  # cells on each side of the surface in which every node is computed
+_BAND: Final = 2.0  # cells on each side of the surface in which every node is computed
 REACH: Final = 0.016  #: of the grid beyond the object: a finger's radius and the soft touch [m]
 
 
@@ -59,10 +59,10 @@ class ShapeBelief:
             alpha, beta = np.hstack([alpha, alpha - extra[0]]), np.concatenate([beta, beta - extra[1]], axis=2)
 
         def at(points: Array) -> Array:
-            known_part = function_values(
+            total = fast_function_values(
                 points, known.points, known.slope_points, alpha, beta, surface.std, surface.length
             )
-            total = surface.prior.value(points)[:, None] + known_part
+            total += surface.prior.fast_value(points)[:, None]
             if waves is not None:
                 total[:, 1:] += waves.value(points)
             return total
@@ -125,8 +125,9 @@ class _Waves:
 
     def value(self, points: Array) -> Array:
         """Return the draws (p, b) at points (p, 3)."""
-        parts = [np.cos(part @ self._o.T + self._a) @ self._w for part in _parts(points)]
-        return np.vstack([np.empty((0, self._w.shape[1])), *parts])
+        turned, start, weights = (a.astype(np.float32) for a in (self._o.T, self._a, self._w))  # some micrometers
+        parts = [np.cos(part.astype(np.float32) @ turned + start) @ weights for part in _parts(points)]
+        return np.vstack([np.empty((0, self._w.shape[1])), *parts]).astype(np.float64)
 
     def slope(self, points: Array) -> Array:
         """Return the slopes of the draws (3 p, b), three rows a point."""
@@ -135,7 +136,7 @@ class _Waves:
 
 
 def _parts(points: Array) -> list[Array]:
-    return [points[start : start + 20_000] for start in range(0, len(points), 20_000)]
+    return [points[start : start + 500] for start in range(0, len(points), 500)]
 
 
 def _on_grid(grid: Grid, at: Callable[[Array], Array], functions: int) -> Array:

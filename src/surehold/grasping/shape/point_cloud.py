@@ -99,6 +99,11 @@ def cleaned(
     points = _largest_object(points, camera, notes)
     _enough(points, "clean ")
     size = np.ptp(points[:, :3], axis=0)
+    if camera is not None and np.all((camera > points[:, :3].min(axis=0)) & (camera < points[:, :3].max(axis=0))):
+        raise InputError(
+            f"the camera {np.round(camera, 4).tolist()} m lies among the points of the object; give where it stood, in "
+            "the file's unit and frame, or leave it out."
+        )
     spread = np.linalg.svd(points[:, :3] - points[:, :3].mean(axis=0), compute_uv=False) / np.sqrt(len(points))
     if spread[1] < max(0.02 * spread[0], 0.0005):
         raise InputError(

@@ -11,13 +11,14 @@
 (Dragiev, Toussaint and Gienger 2013; Castanheira and others 2018 with the unscented criterion in place of the mean.)
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import unknown_name
+from surehold.errors import InputError, unknown_name
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.shape.belief import ShapeBelief, grid_of
 from surehold.grasping.shape.implicit_surface import Observations, surface_of
@@ -26,7 +27,7 @@ from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.perturbation import perturbed_points
 
-__all__ = ["GOALS", "Exploration", "ExploredGrasp", "belief_of_box"]
+__all__ = ["GOALS", "Exploration", "ExploredGrasp", "belief_of_box", "belief_of_size"]
 
 Array = NDArray[np.float64]
 
@@ -46,15 +47,34 @@ class ExploredGrasp(NamedTuple):
 
     x: Array  #: (d,) in the units of the problem's box
     mean: float  #: expected quality under shape and hand noise
-    std: float  #: standard deviation of it over the shapes
+    std: float  #: standard deviation of one execution: shape and hand noise
+    quantile: float  #: value that 95 % of executions are better than
 
 
 def belief_of_box(obj: GraspObject, cell: float = _CELL) -> ShapeBelief:
     """Return a belief that knows nothing of an object but its box, name, mass and friction."""
     box = PriorShape("box", obj.box_center, obj.axes, obj.box_half_extents)
+    return _of_prior(box, cell, obj.name, obj.mass, obj.friction)
+
+
+def belief_of_size(edges: Sequence[float], name: str = "box", mass: float | None = None) -> ShapeBelief:
+    """Return a belief that knows the edges (3,) of a box [m] alone; its middle is the origin of the object's frame.
+
+    Raises
+    ------
+    InputError
+        If an edge is no length that a hand can grasp.
+    """
+    half = 0.5 * np.asarray(edges, dtype=np.float64)
+    if half.shape != (3,) or not np.all((half > 0.002) & (half < 0.5)):
+        raise InputError(f"box is {list(edges)}; give its three edges in meters, each from 0.004 to 1.")
+    return _of_prior(PriorShape("box", np.zeros(3), np.eye(3), half), _CELL, name, mass, 0.5)
+
+
+def _of_prior(box: PriorShape, cell: float, name: str, mass: float | None, friction: float) -> ShapeBelief:
     size = float(np.exp(np.mean(np.log(box.half))))
     surface = surface_of(box, Observations(), _SPREAD[0] * size, _SPREAD[1] * size)
-    return ShapeBelief(surface, grid_of(surface, cell), obj.name, obj.mass, obj.friction)
+    return ShapeBelief(surface, grid_of(surface, cell), name, mass, friction)
 
 
 class Exploration:
@@ -74,6 +94,8 @@ class Exploration:
         Draws of the shape, B.
     seed
         Of all draws.
+    scaled
+        Whether what is told may be in another unit than the problem's quality; it is brought to it by least squares.
 
     Raises
     ------
@@ -89,18 +111,20 @@ class Exploration:
         goal: str = "grasp",
         shapes: int = 4,
         seed: int = 0,
+        scaled: bool = False,
     ):
         if goal not in GOALS:
             raise unknown_name("goal", goal, GOALS)
         self._problem, self._noise, self._goal, self._shapes, self._seed = problem, noise, goal, shapes, seed
+        self._scaled = scaled
         self.belief = belief
         self.X: Array = np.empty((0, problem.box.dimension))  #: trials told, in the units of the box
         self.y: Array = np.empty(0)  #: their qualities
         self._felt = belief.surface.observations  # all of it, bounds apart
         self._free: Array = np.empty((0, 4))
 
-    def ask(self) -> Array:
-        """Return the next trial (d,)."""
+    def ask(self, pending: Array | None = None) -> Array:
+        """Return the next trial (d,); `pending` (p, d) are under way."""
         box = self._problem.box
         candidates = self._candidates()
         imagined = self._imagined()
@@ -109,35 +133,47 @@ class Exploration:
         else:
             values = np.array([imagined.over_shapes(x) for x in candidates])
             scores = values.mean(axis=1) + KAPPA * values.std(axis=1)
-        if len(self.X):  # the same trial tells nothing new
-            gaps = np.abs(box.to_unit(candidates)[:, None] - box.to_unit(self.X)[None]).max(axis=2).min(axis=1)
+        known = self.X if pending is None else np.vstack([self.X, pending])
+        if len(known):  # the same trial tells nothing new
+            gaps = np.abs(box.to_unit(candidates)[:, None] - box.to_unit(known)[None]).max(axis=2).min(axis=1)
             scores = np.where(gaps < 1e-3, -np.inf, scores)
         return candidates[int(np.argmax(scores))]
 
     def tell(self, x: Array, quality: float, felt: Observations) -> None:
         """Add a trial at x (d,): what it was worth, and what was felt, in the object's frame."""
-        self.X = np.vstack([self.X, x])
-        self.y = np.append(self.y, quality)
-        surface = self.belief.surface
-        self._felt = self._felt + replace(felt, free=np.empty((0, 4)))
-        self._free = np.vstack([self._free, felt.free])  # bounds become active anew: what is learnt may free them
-        learnt = surface_of(surface.prior, replace(self._felt, free=self._free), surface.std, surface.length)
-        self.belief = self.belief.with_surface(learnt)
+        self.restore(np.asarray(x)[None], np.array([quality]), [felt])
 
-    def recommend(self) -> ExploredGrasp:
-        """Return the grasp that is expected to hold best under shape and hand noise."""
+    def restore(self, X: Array, y: Array, felt: Sequence[Observations]) -> None:
+        """Add trials at X (n, d), what they were worth (n,), and all that was felt."""
+        self.X, self.y = np.vstack([self.X, X]), np.append(self.y, y)
+        for each in felt:
+            self._felt = self._felt + replace(each, free=np.empty((0, 4)))
+            self._free = np.vstack([self._free, each.free])  # bounds become active anew: what is learnt may free them
+        if felt:
+            surface = self.belief.surface
+            told = replace(self._felt, free=self._free)
+            self.belief = self.belief.with_surface(surface_of(surface.prior, told, surface.std, surface.length))
+
+    def recommend(self, tried: bool = False) -> ExploredGrasp:
+        """Return the grasp that is expected to hold best under shape and hand noise; `tried`: of the trials told."""
         imagined = self._imagined()
-        candidates = np.vstack([self.X, self._candidates()])
-        # A trial was made on the true shape: its own value counts as one more draw.
+        candidates = self.X if tried else np.vstack([self.X, self._candidates()])
         first = np.array([imagined.over_shapes(x).mean() for x in candidates])
-        first[: len(self.X)] = 0.5 * (first[: len(self.X)] + self.y)
-        best = np.argsort(-first, kind="stable")[:_ANSWERS]
+        # A trial was made on the true shape: its own value counts as much as all that is imagined.
+        off = np.zeros(len(candidates))
+        off[: len(self.X)] = 0.5 * (self._worth(first[: len(self.X)]) - first[: len(self.X)])
         answers = []
-        for x in candidates[best]:
-            points = perturbed_points(x, self._problem.box, self._noise, _DISTURBED, self._seed)
-            values = np.array([imagined.over_shapes(point) for point in points])
-            answers.append(ExploredGrasp(x, float(values.mean()), float(values.mean(axis=0).std())))
+        for k in np.argsort(-(first + off), kind="stable")[:_ANSWERS]:
+            points = perturbed_points(candidates[k], self._problem.box, self._noise, _DISTURBED, self._seed)
+            values = np.array([imagined.over_shapes(point) for point in points]) + off[k]
+            mean, std = float(values.mean()), float(values.std())
+            answers.append(ExploredGrasp(candidates[k], mean, std, float(np.quantile(values, 0.05))))
         return max(answers, key=lambda answer: answer.mean)
+
+    def _worth(self, believed: Array) -> Array:
+        """Return what was told in the unit of the problem's quality; `believed` (n,) is that of the same trials."""
+        square = float(self.y @ self.y)
+        return self.y * (max(float(believed @ self.y), 0.0) / square if self._scaled and square > 0.0 else 1.0)
 
     def _imagined(self) -> GraspProblem:
         """Return the problem on the shapes that are possible now."""

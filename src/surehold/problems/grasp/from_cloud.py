@@ -14,12 +14,11 @@ from surehold.grasping.object.model import GraspObject
 from surehold.grasping.shape.belief import ShapeBelief
 from surehold.grasping.shape.implicit_surface import surface_of
 from surehold.grasping.shape.prior import PRIORS
-from surehold.problems.grasp.touch import contacts_of_file
+from surehold.problems.grasp.told_contacts import checked_against, contacts_of_file
 
 __all__ = ["belief_of_file", "object_of_cloud"]
 
 _MOST_SHAPES = 64
-_FARTHEST_TOUCH = 0.1  # off the surface of the cloud [m]
 
 
 def object_of_cloud(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
@@ -83,12 +82,7 @@ def belief_of_file(words: Mapping[str, Any]) -> tuple[ShapeBelief, str]:
     notes = list(cloud.notes)
     if words["contacts"]:
         touched = contacts_of_file(words["contacts"])
-        away = float(np.abs(belief.surface.value(touched.points)).max())
-        if away > _FARTHEST_TOUCH:
-            raise InputError(
-                f"a contact of {words['contacts']!r} is {1e3 * away:.0f} mm off the cloud's surface; give points "
-                "in the cloud's frame, in meters."
-            )
+        checked_against(belief.surface, touched, f"{words['contacts']!r}")
         known = belief.surface
         learnt = surface_of(known.prior, known.observations + touched, known.std, known.length)
         belief = belief.with_surface(learnt)

@@ -2,18 +2,15 @@
 
 A trial of a real hand begins with an approach, along the palm's normal; a hand that meets the object on its way stops
 there, and that is a touch too. With `probe` the closing ends at the first touch as well. In simulation the hand feels
-the object as far away as `_FELT`; a robot tells points and normals (`contacts_of_file`).
+the object as far away as `_FELT`; a robot tells points and normals (told_contacts.py).
 """
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import InputError
 from surehold.grasping.closing.contacts import Contacts
 from surehold.grasping.grasp import Grasp
 from surehold.grasping.hand.kinematics import link_ends
@@ -22,18 +19,16 @@ from surehold.grasping.pictures.scene import closing_steps
 from surehold.grasping.poses import Pose
 from surehold.grasping.shape.implicit_surface import Observations, spaced
 from surehold.grasping.simulator import Simulator
+from surehold.problems.grasp.told_contacts import touches
 
-__all__ = ["TOUCH_NOISE", "Touch", "contacts_of_file", "touch_trial"]
+__all__ = ["Touch", "touch_trial"]
 
 Array = NDArray[np.float64]
 
-TOUCH_NOISE: Final = 0.0005  #: of a felt point, along its normal [m]
-_NORMAL_NOISE: Final = 0.15  # of a normal's components
 _FELT: Final = 0.001  # gap at which the skin feels the object [m]
 _SPACING: Final = 0.010  # touches in the same cube of this edge count once [m]
 _FREE_SPACING: Final = 0.012  # m
 _BACK: Final = 0.15  # from where a hand approaches [m]
-_TOO_MANY: Final = 2000  # contacts of a file
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,52 +61,12 @@ def touch_trial(simulator: Simulator, pose: Pose, s1: float | tuple[float, ...],
     return Touch(grasp, felt + Observations(free=_swept(simulator, moved + back)))
 
 
-def contacts_of_file(path: str | Path) -> Observations:
-    """Read touches from JSON: {"contacts": [{"point": [x, y, z], "normal": [x, y, z]}, ...]} in m, normals outward.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, holds no contacts, or a number is missing or not finite.
-    """
-    try:
-        rows = json.loads(Path(path).read_text(encoding="utf-8"))["contacts"]
-        points = np.array([row["point"] for row in rows], dtype=np.float64).reshape(len(rows), 3)
-        normals = np.array([row["normal"] for row in rows], dtype=np.float64).reshape(len(rows), 3)
-    except OSError as error:
-        raise InputError(f"contacts {str(path)!r} cannot be read: {error.strerror}; check the path.") from None
-    except (ValueError, TypeError, KeyError) as error:
-        reason = " ".join(str(error).split())[:80]
-        raise InputError(
-            f"contacts {str(path)!r} are not read ({reason}); give "
-            '{"contacts": [{"point": [x, y, z], "normal": [x, y, z]}]} in meters.'
-        ) from None
-    if not 0 < len(points) <= _TOO_MANY:
-        raise InputError(f"contacts {str(path)!r} hold {len(points)} touches; give 1 to {_TOO_MANY}.")
-    length = np.linalg.norm(normals, axis=1)
-    bad = ~(np.all(np.isfinite(points), axis=1) & (np.abs(length - 1.0) < 0.1))
-    if np.any(bad):
-        first = int(np.flatnonzero(bad)[0])
-        raise InputError(
-            f"contact {first} of {str(path)!r} is {points[first].tolist()} with normal {normals[first].tolist()}; "
-            "give finite points and unit normals."
-        )
-    return _touches(points, normals / length[:, None])
-
-
-def _touches(points: Array, normals: Array) -> Observations:
-    n = len(points)
-    return Observations(
-        points, np.zeros(n), np.full(n, TOUCH_NOISE), points, normals, np.full(n, _NORMAL_NOISE), np.empty((0, 4))
-    )
-
-
 def _felt(contacts: Contacts, depth: float) -> Observations:
     """Return the contacts whose skin is nearer than `_FELT`, one for each spot. Their normals point into the object."""
     near = np.flatnonzero(contacts.weights > 1.0 - _FELT / depth)
     near = near[np.argsort(-contacts.weights[near], kind="stable")]
     near = near[spaced(contacts.points[near], _SPACING)] if len(near) else near
-    return _touches(contacts.points[near], -contacts.normals[near])
+    return touches(contacts.points[near], -contacts.normals[near])
 
 
 def _swept(simulator: Simulator, placed: list[tuple[Pose, Array]]) -> Array:

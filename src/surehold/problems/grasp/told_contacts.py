@@ -1,0 +1,140 @@
+"""What a robot tells of a trial that touched: points and outward normals, in the object's frame, and swept space.
+
+    {"contacts": [{"point": [x, y, z], "normal": [nx, ny, nz]}, ...], "free": [[x, y, z, r], ...]}
+
+in meters; `free` may be left out: within r of these points there was no object. What contradicts itself or what is
+known is refused, with the numbers: a wrong frame, a wrong unit and inward normals are the usual reasons.
+"""
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surehold.errors import InputError
+from surehold.grasping.shape.implicit_surface import ImplicitSurface, Observations
+
+__all__ = ["TOUCH_NOISE", "checked_against", "contact_rows", "contacts_of_file", "contacts_told", "touches"]
+
+Array = NDArray[np.float64]
+
+TOUCH_NOISE: Final = 0.0005  #: of a felt point, along its normal [m]
+NORMAL_NOISE: Final = 0.15  #: of a normal's components
+_MOST: Final = 2000  # contacts told at once
+_SAME_PLACE: Final = 0.001  # nearer contacts are of one spot of the surface [m]
+_LARGEST: Final = 2.0  # a coordinate [m]; what is larger was not told in meters
+_IMPOSSIBLE: Final = 6.0  # standard deviations that a contact may lie off what is known
+_CLOSE: Final = 0.008  # a contact nearer to the surface is never impossible [m]
+_FORM: Final = '{"contacts": [{"point": [x, y, z], "normal": [x, y, z]}]} in meters'
+
+
+def touches(points: Array, normals: Array) -> Observations:
+    """Return contacts at points (n, 3) with outward unit normals (n, 3) as observations of a shape."""
+    n = len(points)
+    noise, slope_noise = np.full(n, TOUCH_NOISE), np.full(n, NORMAL_NOISE)
+    return Observations(points, np.zeros(n), noise, points, normals, slope_noise, np.empty((0, 4)))
+
+
+def contacts_of_file(path: str | Path) -> Observations:
+    """Read contacts from JSON, see above.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or `contacts_told` refuses what it holds.
+    """
+    return contacts_told(contact_rows(path), f"contacts {str(path)!r}")
+
+
+def contact_rows(path: str | Path) -> Any:
+    """Read what a file of contacts holds, unchecked; raises InputError if it cannot be read or is no JSON."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"contacts {str(path)!r} cannot be read: {error.strerror}; check the path.") from None
+    except ValueError as error:
+        reason = " ".join(str(error).split())[:80]
+        raise InputError(f"contacts {str(path)!r} are not read ({reason}); give {_FORM}.") from None
+
+
+def contacts_told(told: Any, what: str = "contacts") -> Observations:
+    """Return what a robot told, as observations.
+
+    Parameters
+    ----------
+    told
+        Plain data, see above.
+    what
+        Name of it in messages.
+
+    Raises
+    ------
+    InputError
+        If there are no contacts, a number is missing or not finite, a normal is not of unit length, or two contacts
+        at one place have opposite normals.
+    """
+    try:
+        rows = told["contacts"]
+        points = np.array([row["point"] for row in rows], dtype=np.float64).reshape(len(rows), 3)
+        normals = np.array([row["normal"] for row in rows], dtype=np.float64).reshape(len(rows), 3)
+        free = np.array(told.get("free", []), dtype=np.float64).reshape(-1, 4)
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        reason = " ".join(str(error).split())[:80]
+        raise InputError(f"{what} are not read ({reason}); give {_FORM}.") from None
+    if not 0 < len(points) <= _MOST and not (len(free) and len(free) <= _MOST):
+        raise InputError(f"{what} hold {len(points)} touches; give 1 to {_MOST}.")
+    length = np.linalg.norm(normals, axis=1)
+    bad = ~(np.all(np.isfinite(points), axis=1) & (np.abs(length - 1.0) < 0.1))
+    if np.any(bad):
+        first = int(np.flatnonzero(bad)[0])
+        raise InputError(
+            f"contact {first} of {what} is {points[first].tolist()} with normal {normals[first].tolist()}; "
+            "give finite points and unit normals."
+        )
+    if not (np.all(np.isfinite(free)) and np.all(free[:, 3] > 0.0)):
+        raise InputError(f"a free point of {what} is not finite or has a radius of 0 or less; give [x, y, z, r].")
+    largest = float(np.abs(np.vstack([points, free[:, :3]])).max())
+    if largest > _LARGEST:
+        raise InputError(f"{what} reach {largest:g} m from the object's frame; give meters, in that frame.")
+    normals = normals / np.where(length > 0.0, length, 1.0)[:, None]
+    _agreeing(points, normals, what)
+    found = touches(points, normals)
+    return found + Observations(free=free)
+
+
+def _agreeing(points: Array, normals: Array, what: str) -> None:
+    """Refuse contacts of one place with opposite normals."""
+    from scipy.spatial import KDTree
+
+    pairs = KDTree(points).query_pairs(_SAME_PLACE, output_type="ndarray") if len(points) else np.empty((0, 2), int)
+    opposite = pairs[np.sum(normals[pairs[:, 0]] * normals[pairs[:, 1]], axis=1) < -0.2] if len(pairs) else pairs
+    if len(opposite):
+        i, j = (int(k) for k in opposite[0])
+        angle = np.degrees(np.arccos(np.clip(normals[i] @ normals[j], -1.0, 1.0)))
+        raise InputError(
+            f"contacts {i} and {j} of {what} are {1e3 * np.linalg.norm(points[i] - points[j]):.1f} mm apart, but their "
+            f"normals {angle:.0f} degrees; normals point out of the object: turn or drop the wrong one."
+        )
+
+
+def checked_against(surface: ImplicitSurface, told: Observations, what: str = "contacts") -> None:
+    """Refuse contacts that cannot be of the shape that is known.
+
+    Raises
+    ------
+    InputError
+        If a contact lies farther off the surface than is possible, or where the shape is known to be otherwise.
+    """
+    if not len(told.points):
+        return
+    off = np.abs(surface.value(told.points))
+    known = np.hypot(surface.deviation(told.points), told.noise)
+    wrong = np.flatnonzero((off > _CLOSE) & (off > _IMPOSSIBLE * known))
+    if len(wrong):
+        k = int(wrong[np.argmax(off[wrong] / known[wrong])])
+        raise InputError(
+            f"contact {k} of {what} is {1e3 * off[k]:.0f} mm off the surface, which is known there to "
+            f"{1e3 * known[k]:.0f} mm; give meters in the object's frame, or drop that contact."
+        )
