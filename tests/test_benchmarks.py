@@ -1,6 +1,9 @@
 """The stored table of benchmarks: what is written is read again, and a loss is marked. Nothing is timed here."""
 
+import pytest
+
 from benchmarks import stored
+from benchmarks.regret_causes import cause
 
 
 def test_a_stored_table_is_compared_in_yardsticks(tmp_path):
@@ -16,3 +19,17 @@ def test_a_stored_table_is_compared_in_yardsticks(tmp_path):
     assert "new" in new
     (_, lost) = stored.lines({"ask": 0.03}, 1e-4, before)
     assert lost.endswith("1.50  SLOWER")
+
+
+@pytest.mark.parametrize(
+    ("full", "tried", "climb", "z", "expected"),
+    [
+        (0.9, 0.9, 0.0, 9.0, "found"),
+        (1.5, 0.9, 0.0, 9.0, "answer"),
+        (1.5, 1.2, 0.9, 9.0, "climb"),
+        (1.5, 1.2, 1.1, 2.9, "search"),
+        (1.5, 1.2, 1.1, 3.1, "model"),
+    ],
+)
+def test_the_first_cause_that_is_true_is_that_of_a_regret(full, tried, climb, z, expected):
+    assert cause({"full": full, "tried": tried, "climb": climb, "z": z}) == expected

@@ -1,6 +1,9 @@
+from dataclasses import replace
 from pathlib import Path
 
+from surehold import __version__
 from surehold.campaigns import reproduction
+from surehold.campaigns.plan import MethodSetup
 from surehold.campaigns.reproduction import reproduction_text
 from surehold.campaigns.runner import run_campaign
 from surehold.campaigns.table import PACKED, read_folder
@@ -25,6 +28,7 @@ def test_packing_and_writing(tmp_path, monkeypatch, cheap):
     reproduction.main(["--pack"])
     text = (tmp_path / "docs/reproduction.md").read_text()
     assert "8 of 16 planned runs" in text
+    assert "names no surrogate" not in text, "all methods of this plan name theirs"
     assert "| 4 | 2: all |" in text, "unfinished cells are not shown"
     run_campaign(cheap, tmp_path / "results/cheap", runs=3, only=["hill", "UBO"])
     run_campaign(cheap, tmp_path / "results/cheap", runs=3, only=["flat"])
@@ -38,3 +42,10 @@ def test_packing_and_writing(tmp_path, monkeypatch, cheap):
     text = (tmp_path / "docs/reproduction.md").read_text()
     assert "16 of 16 planned runs" in text
     assert "unfinished" not in text
+
+
+def test_methods_with_the_default_surrogate_are_named_with_their_version(tmp_path, cheap):
+    methods = {"robust": MethodSetup(robust=True), "thesis": MethodSetup(settings={"preset": "thesis"})}
+    plan = replace(cheap, methods=methods | {"random": MethodSetup(optimizer="random")})
+    run_campaign(plan, tmp_path / "cheap", runs=1, only=["flat", "random"])
+    assert f"They are: robust of `cheap` ({__version__})." in reproduction_text(tmp_path)

@@ -40,6 +40,7 @@ def reproduction_text(results: str | Path) -> str:
     report = campaign_report(campaigns, illustrated=False)
     facts = ", ".join(f"{number} {what}" for number, what in report.facts)
     parts = [_HEAD, f"**{report.headline}** {facts[0].upper()}{facts[1:]}.\n"]
+    parts += _of_defaults(campaigns)
     unfinished = _unfinished(campaigns)
     if unfinished.rows:
         parts.append(f"## What is unfinished\n\n{markdown_table(unfinished)}\n")
@@ -55,6 +56,25 @@ def reproduction_text(results: str | Path) -> str:
                 parts.append(f"{table.note}\n")
     parts += [f"> {note}\n" for note in report.notes]
     return "\n".join(parts)
+
+
+def _of_defaults(campaigns: dict[str, Records]) -> list[str]:
+    """Return a paragraph on the methods whose plan names no surrogate: they have the default of their version."""
+    named = []
+    for plan, records in campaigns.items():
+        methods = {
+            cell["method"]: None
+            for cell in records.header["cells"]
+            if cell["optimizer"] == "surehold" and not cell["settings"].keys() & {"surrogate", "preset"}
+        }
+        if methods:
+            named.append(f"{', '.join(methods)} of `{plan}` ({records.header['surehold']})")
+    if not named:
+        return []
+    return [
+        "Methods whose plan names no surrogate have the default of the version that made them, which is `gp` in 0.1.0 "
+        f"and `two_scales` from 0.2.0 on. They are: {'; '.join(named)}.\n"
+    ]
 
 
 def _unfinished(campaigns: dict[str, Records]) -> Table:
