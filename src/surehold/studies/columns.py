@@ -17,7 +17,7 @@ from optuna.storages import RDBStorage
 from optuna.storages._rdb import models
 from optuna.storages._rdb.storage import _create_scoped_session
 from optuna.trial import FrozenTrial, TrialState
-from sqlalchemy import Select, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 __all__ = ["ColumnStorage"]
@@ -41,7 +41,7 @@ class ColumnStorage(RDBStorage):
         with _create_scoped_session(self.scoped_session) as session:
             models.StudyModel.find_or_raise_by_id(study_id, session)
             # Heads first: a trial that they call complete has its values by then.
-            heads = session.execute(_select(models.TrialModel, study_id, *_HEAD)).all()
+            heads = list(_rows(session, study_id, models.TrialModel, *_HEAD))
             values: dict[int, dict[int, float]] = defaultdict(dict)
             kind = models.TrialValueModel
             for id, objective, value, form in _rows(session, study_id, kind, "objective", "value", "value_type"):
@@ -78,7 +78,7 @@ class ColumnStorage(RDBStorage):
         ]
 
 
-def _select(model: Any, study_id: int, *columns: str) -> Select[Any]:
+def _select(model: Any, study_id: int, *columns: str) -> Any:
     """Return the query of some columns of a table for all trials of a study, in the order of writing."""
     table, trials = model.__table__, models.TrialModel.__table__
     query = select(table.c.trial_id, *(table.c[name] for name in columns)).where(trials.c.study_id == study_id)
