@@ -77,3 +77,8 @@ def test_dividing_the_bins_keeps_every_trial_where_it_was():
 def test_bad_input_is_said_in_one_line(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+def test_the_first_stage_is_no_larger_than_the_box():
+    assert NestedEmbedding(sh.Box.unit(2), trials=10).dimension == 2
+    assert NestedEmbedding(sh.Box.unit(9), trials=10).dimension == 4

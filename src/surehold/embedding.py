@@ -20,6 +20,7 @@ from surehold.optimization.optimizer import Optimizer
 
 __all__ = ["NestedEmbedding", "RandomEmbedding"]
 
+_FIRST_BINS: Final = 4
 _PARTS: Final = 4  # into which a bin is divided, where it holds as many variables
 
 
@@ -100,7 +101,7 @@ class NestedEmbedding:
     trials
         Number of trials that will be made.
     dimension
-        Bins of the first stage, at most D.
+        Bins of the first stage, at most D; None: 4, or D where there are fewer variables.
     seed, **settings
         As of `RandomEmbedding`.
 
@@ -110,7 +111,8 @@ class NestedEmbedding:
         For numbers out of range, or settings that are about the box's own variables.
     """
 
-    def __init__(self, box: Box, trials: int, dimension: int = 4, *, seed: int = 0, **settings: Any):
+    def __init__(self, box: Box, trials: int, dimension: int | None = None, *, seed: int = 0, **settings: Any):
+        dimension = min(_FIRST_BINS, box.dimension) if dimension is None else dimension
         _check(box, dimension, settings)
         self.box: Final = box
         self._settings: Final = {"trust_region": True, **settings}

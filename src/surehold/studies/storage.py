@@ -25,7 +25,7 @@ from typing import Any, BinaryIO, Final
 
 from optuna import logging
 from optuna.exceptions import DuplicatedStudyError, StorageInternalError
-from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, RDBStorage, get_storage
+from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, get_storage
 from optuna.storages.journal import BaseJournalBackend, JournalFileBackend
 
 from surehold.errors import InputError
@@ -296,11 +296,13 @@ def _postgresql(driver_url: str, url: str) -> Storage:
 def _database(driver_url: str, url: str, engine_kwargs: dict[str, Any]) -> tuple[BaseStorage, Any]:
     from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
+    from surehold.studies.columns import ColumnStorage
+
     shown = _without_password(url)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            storage = RDBStorage(driver_url, engine_kwargs=engine_kwargs)
+            storage = ColumnStorage(driver_url, engine_kwargs=engine_kwargs)
     except ArgumentError as error:
         raise InputError(f"storage {shown!r} is no valid URL: {error}.") from None
     except SQLAlchemyError as error:
