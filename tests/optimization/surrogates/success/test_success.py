@@ -166,3 +166,45 @@ def test_log_posterior_adds_the_prior():
     np.testing.assert_allclose(K, expected, atol=1e-12)
     evidence = laplace(K, y, np.ones(15), np.empty(15), np.empty(15), np.empty((15, 15)))
     assert log_posterior(theta, counts) == pytest.approx(evidence - 0.5 * theta @ theta)
+
+
+def test_evidence_gradient_as_the_closed_form_gives():
+    """Rasmussen and Williams 2006, algorithm 5.1, for the log signal variance, against differences of `laplace`."""
+    X, y = data(15)
+    ones = np.ones(15)
+    base = correlation("matern52", X, X, L)
+
+    def evidence(log_s2):
+        K = np.exp(log_s2) * base + 1.0 + 1e-9 * np.eye(15)
+        return laplace(K, y, ones, np.empty(15), np.empty(15), np.empty((15, 15)))
+
+    K = S2 * base + 1.0 + 1e-9 * np.eye(15)
+    a, W = np.empty(15), np.empty(15)
+    laplace(K, y, ones, a, W, np.empty((15, 15)))
+    f, t = K @ a, 2.0 * y - 1.0
+    r = np.exp(stats.norm.logpdf(f) - log_ndtr(t * f))
+    third = t * r * (2.0 * r**2 + 3.0 * t * f * r + f**2 - 1.0)  # d3 log Phi(t f) / df3
+    R = np.linalg.inv(K + np.diag(1.0 / W))
+    by_f = 0.5 * np.diag(K - K @ R @ K) * third
+    C = S2 * base
+    b = C @ a
+    explicit = 0.5 * a @ C @ a - 0.5 * np.trace(R @ C)
+    gradient = explicit + by_f @ (b - K @ R @ b)
+    h = 1e-4
+    differences = (evidence(np.log(S2) + h) - evidence(np.log(S2) - h)) / (2.0 * h)
+    assert differences == pytest.approx(gradient, rel=1e-4, abs=1e-7)
+
+
+def test_probabilities_near_those_of_the_logistic_classifier():
+    """scikit-learn's Laplace with its logistic link, whose latent function is about 1.7 times that of a probit."""
+    from sklearn.gaussian_process import GaussianProcessClassifier
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+
+    X, y = data(120)
+    kernel = ConstantKernel(1.7**2 * S2, "fixed") * Matern(L, "fixed", nu=2.5) + ConstantKernel(1.7**2, "fixed")
+    theirs = GaussianProcessClassifier(kernel, optimizer=None).fit(X, y)
+    queries = np.random.default_rng(1).random((200, 2))
+    ours = fixed(X, y).moments(queries).mean[0]
+    difference = ours - theirs.predict_proba(queries)[:, 1]
+    assert np.abs(difference).max() < 0.05
+    assert np.abs(difference).mean() < 0.02
