@@ -4,6 +4,7 @@ import pytest
 
 from surehold.campaigns.plan import MethodSetup, Plan, ProblemSetup, share_of
 from surehold.errors import InputError
+from surehold.optimization.surrogates.named import DEFAULT_SURROGATE
 
 
 def test_runs_go_seed_by_seed_through_all_cells(cheap):
@@ -45,7 +46,9 @@ def test_the_digest_follows_every_setting(cheap):
 def test_settings_of_the_method_come_before_those_of_the_problem():
     problem = ProblemSetup("rkhs", 8, 5, settings={"preset": "thesis-rkhs", "k": 2.0})
     plan = Plan("p", "t", {"a": problem}, {"m": MethodSetup(settings={"preset": None})})
-    assert plan.cells()[0].as_data()["settings"] == {"k": 2.0}
+    assert plan.cells()[0].as_data()["settings"] == {"k": 2.0, "surrogate": DEFAULT_SURROGATE}
+    thesis = Plan("p", "t", {"a": problem}, {"m": MethodSetup()})
+    assert thesis.cells()[0].as_data()["settings"] == {"preset": "thesis-rkhs", "k": 2.0}
     other = Plan("p", "t", {"a": problem}, {"m": MethodSetup("random")})
     assert other.cells()[0].as_data()["settings"] == {}
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from surehold.errors import InputError, unknown_name
+from surehold.optimization.surrogates.named import DEFAULT_SURROGATE
 
 __all__ = ["Cell", "MethodSetup", "Plan", "ProblemSetup", "Task", "share_of"]
 _MOST_RUNS, _MOST_TRIALS = 10_000, 100_000  # more is a slip of the pen: lists of runs and trials are held in memory
@@ -66,6 +67,8 @@ class Cell:
         """Return all settings, JSON-ready."""
         on, by = self.on, self.by
         own = {**on.settings, **by.settings} if by.optimizer == "surehold" else dict(by.settings)
+        if by.optimizer == "surehold" and own.get("preset") is None and own.get("surrogate") is None:
+            own["surrogate"] = DEFAULT_SURROGATE  # another version has another: its runs are not these
         return {
             "function": on.function,
             "arguments": dict(on.arguments),
