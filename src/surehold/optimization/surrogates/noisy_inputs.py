@@ -51,12 +51,13 @@ def condition_on_noisy_inputs(
         size = np.sqrt(np.square(roots).sum(axis=(1, 2)))
         noise = np.hypot(known, spread * np.minimum(2.0 * size, 1.0))  # before slopes are known: those of half the box
     posterior = surrogate.condition(X, y, np.random.default_rng(seed), None, noise)
-    for _ in range(SLOPE_ROUNDS - 1):
+    for following in range(2, SLOPE_ROUNDS + 1):
         if known is not None:
             slopes = np.asarray(posterior.moments(X, gradient=True).mean_gradient).mean(axis=0)  # (n, d)
             noise = np.sqrt(known**2 + np.square(np.einsum("nde,nd->ne", roots, slopes)).sum(axis=1))
-        lowered = y - averaging(posterior, X, roots)
-        posterior = surrogate.condition(X, lowered, np.random.default_rng(seed), None, noise)
+        # The first round knows no slopes and bends after the noise: what it says of averaging is left out.
+        values = y - averaging(posterior, X, roots) if following > 2 or known is None else y
+        posterior = surrogate.condition(X, values, np.random.default_rng(seed), None, noise)
     return posterior
 
 
