@@ -58,10 +58,10 @@ class TouchPoint(_Request):
 class Touches(_Request):
     """What a trial told of the shape."""
 
-    contacts: Annotated[list[TouchPoint], Field(max_length=2000)]
+    contacts: Annotated[list[TouchPoint], Field(max_length=400)]
     free: Annotated[
         list[Annotated[list[_Finite], Field(min_length=4, max_length=4)]],
-        Field(max_length=2000, description="x, y, z, radius: space without the object."),
+        Field(max_length=400, description="x, y, z, radius: space without the object."),
     ] = Field(default_factory=list)
 
 

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 TOUCH_NOISE: Final = 0.0005  #: of a felt point, along its normal [m]
 NORMAL_NOISE: Final = 0.15  #: of a normal's components
-_MOST: Final = 500  # contacts told at once
+_MOST: Final = 400  # contacts told at once
 _SAME_PLACE: Final = 0.001  # nearer contacts are of one spot of the surface [m]
 _LARGEST: Final = 2.0  # a coordinate [m]; what is larger was not told in meters
 _IMPOSSIBLE: Final = 6.0  # standard deviations that a contact may lie off what is known
