@@ -62,7 +62,7 @@ class Simulator:
         "graded" (soft touch, continuous), "patch" or "single" (one for each touching link).
     quality
         One of `QUALITIES`, explained in quality.py: "epsilon" (radius of the largest ball about the origin in the hull
-        of the wrenches), "signed_epsilon", "volume", "simox", "task" or "closure".
+        of the wrenches), "signed_epsilon", "volume", "simox", "task", "closure", "min_weight" or "balance".
     closing
         "adaptive" (links beyond a touching one go on) or "synergy" (a touch stops the whole finger).
     preshape
@@ -174,7 +174,9 @@ class Simulator:
         touched = np.flatnonzero(closed.touched).tolist()
         touching = tuple(dict.fromkeys(map(self.hand.body_names.__getitem__, touched)))
         if len(contacts) < 2:
-            return Grasp("no contact", 0.0, relative, s1, closed.joints, opened, contacts, touching, 0.0)
+            gaps = self.gaps(relative, closed.joints, geometry)[:-1].reshape(self.hand.radii.shape)
+            worth = self.measure.without_contacts(gaps)
+            return Grasp("no contact", worth, relative, s1, closed.joints, opened, contacts, touching, 0.0)
         wrench = self.measure.wrench(contacts.points, contacts.normals, contacts.weights)
         status: Status = "ok" if wrench.force_closure else "not closed"
         worth = float(self.measure.value(contacts.points, contacts.normals, wrench))

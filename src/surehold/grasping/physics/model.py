@@ -4,10 +4,10 @@
     tau  largest torque of a joint, F times the distance to the tip of the stretched finger, N m
 
 The palm rests, links are capsules, the palm is made of boxes with round edges, the object of convex pieces
-(convex_pieces.py); only contacts between hand and object are simulated. Contacts have the friction of the simulator, and
-its torsional friction or that of a patch of `PATCH` radius, whichever is larger: a point contact in the exact sense does
-not exist. Joints are under position control with limited torque; inertia and damping of a motor grow with its stiffness,
-so that strong hands are simulated as well as weak ones.
+(convex_pieces.py); only contacts between hand and object are simulated. Contacts have the friction of the simulator,
+and its torsional friction or that of a patch of `PATCH` radius, whichever is larger: a point contact in the exact sense
+does not exist. Joints are under position control with limited torque; inertia and damping of a motor grow with its
+stiffness, so that strong hands are simulated as well as weak ones.
 """
 
 from importlib import import_module
