@@ -9,7 +9,9 @@ standard error of Hanley and McNeil (1982). "robust" is the mean of epsilon over
 surehold optimizes; the other qualities are of the pose itself. Then the threshold: the robust quality below which no
 grasp was held, and above which nine of ten were.
 
-A row is written for each grasp: a benchmark that is stopped goes on where it was. `--write FILE` writes the table.
+`--objects drill@40` asks for a force of 40 N at the fingertips instead of the hand's own. Objects take turns and grasps
+come in random order, so that a benchmark that is stopped has a fair sample of all. A row is written for each grasp: it
+goes on where it was. `--write FILE` writes the table.
 """
 
 import argparse
@@ -29,7 +31,7 @@ from surehold.problems import GraspProblem
 from surehold.problems.perturbation import perturbed_points
 
 NOISE = sh.InputNoise.unit(0.03)
-DRAWN, AROUND, NEAR = 3000, 1000, 0.05
+DRAWN, AROUND, NEAR = 2000, 800, 0.05
 BINS = 10
 SHAKEN, AVERAGED = 5, 30
 QUALITIES = ("epsilon", "volume", "simox", "task", "min_weight", "balance")
@@ -122,35 +124,41 @@ def stored(path):
     return rows
 
 
+class Case:
+    """One object, hand, facet and force, and its grasps."""
+
+    def __init__(self, asked, hand, facet, n):
+        name, _, force = asked.partition("@")
+        self.problem = GraspProblem(name, facet, ("dx", "dy", "dz"), hand=hand)
+        simulator = self.problem.simulator
+        self.checker = GraspChecker(simulator, finger_force=float(force) if force else None)
+        self.measures = {quality: Measure(quality, self.problem.object, simulator.friction) for quality in QUALITIES}
+        self.name = f"{name}, {simulator.hand.name}, {self.problem.facet}, {self.checker.finger_force:g} N"
+        self.points = sample(self.problem, n, seed=0)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rows", type=Path, required=True, help="file of finished grasps; made or continued")
-    parser.add_argument("--objects", nargs="*", default=list(OBJECTS))
+    parser.add_argument(
+        "--objects", nargs="*", default=list(OBJECTS), help="NAME or NAME@NEWTONS; none: the table only"
+    )
     parser.add_argument("--facet", default="")
     parser.add_argument("--hand", default="icub-left")
-    parser.add_argument(
-        "--force", type=float, default=None, help="of a stretched finger [N]; the hand's own if not given"
-    )
     parser.add_argument("--grasps", type=int, default=200)
     parser.add_argument("--write", type=Path, default=None, help="file for the table")
     arguments = parser.parse_args()
     rows = stored(arguments.rows)
-    for name in arguments.objects:
-        problem = GraspProblem(name, arguments.facet, ("dx", "dy", "dz"), hand=arguments.hand)
-        simulator = problem.simulator
-        checker = GraspChecker(simulator, finger_force=arguments.force)
-        measures = {name: Measure(name, problem.object, simulator.friction) for name in QUALITIES}
-        case = f"{name}, {simulator.hand.name}, {problem.facet}, {checker.finger_force:g} N"
-        done = {row["number"] for row in rows.get(case, ())}
-        if len(done) >= arguments.grasps:
-            continue
-        for number, x in enumerate(sample(problem, arguments.grasps, seed=0)):
-            if number in done:
+    cases = [Case(asked, arguments.hand, arguments.facet, arguments.grasps) for asked in arguments.objects]
+    for number in range(arguments.grasps):
+        for case in cases:
+            done = rows.setdefault(case.name, [])
+            if number >= len(case.points) or number in {row["number"] for row in done}:
                 continue
-            row = row_of(problem, checker, measures, x, number)
-            rows.setdefault(case, []).append(row)
+            row = row_of(case.problem, case.checker, case.measures, case.points[number], number)
+            done.append(row)
             with arguments.rows.open("a") as file:
-                file.write(json.dumps({"case": case, **row}) + "\n")
+                file.write(json.dumps({"case": case.name, **row}) + "\n")
     lines = list(table(rows))
     print(*lines, sep="\n")
     if rows:

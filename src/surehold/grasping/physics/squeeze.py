@@ -29,7 +29,7 @@ __all__ = ["balanced_torques"]
 
 Array = NDArray[np.float64]
 
-_BALANCE: Final = 100.0  # B: strain that a hand would take rather than a wrench of 1 % of the squeeze
+_BALANCE: Final = 1000.0  # B by the largest strain: rather all of that than a wrench of a thousandth of the squeeze
 _RESERVE: Final = 0.8  # share of the friction that the squeeze relies on: the rest is left for the load
 _NEAR: Final = 0.5  # weight of a soft touch from which on the skin is pressed [1 - gap / depth]
 
@@ -73,9 +73,10 @@ def balanced_torques(simulator: Simulator, grasp: Grasp, limits: Array) -> tuple
     frames = link_frames(hand.bases, hand.chains, np.ascontiguousarray(grasp.joints))
     of_edge = np.repeat(np.arange(len(points)), per_contact)
     strain = _strains(hand.chains, frames, limits, places[of_edge], forces, bodies[of_edge])
-    system = np.vstack([strain, _BALANCE * wrenches.T, np.full(len(wrenches), _BALANCE)])
+    heavy = _BALANCE * (np.abs(strain).max() or 1.0)
+    system = np.vstack([strain, heavy * wrenches.T, np.full(len(wrenches), heavy)])
     goal = np.zeros(len(system))
-    goal[-1] = _BALANCE
+    goal[-1] = heavy
     x, _ = nnls(system, goal, maxiter=30 * len(wrenches))
     if not x.any():
         return torques, 1.0
