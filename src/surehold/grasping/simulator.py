@@ -68,7 +68,7 @@ class Simulator:
     preshape
         Type of grasp, one of the hand's `preshapes`; the first one if not given ("power" for the iCub).
     friction
-        Coefficient of friction; the object's own if not given.
+        Coefficient of friction; if not given the hand's, where it has one, else the object's own.
     torsion
         Torsional friction of soft fingers: largest moment about the normal by normal force [m], see
         `soft_finger_torsion`; 0 for hard points.
@@ -134,7 +134,8 @@ class Simulator:
         preshape_of(self.hand, preshape)
         self.preshape: Final = preshape or next(iter(self.hand.preshapes))
         self.collision: Final = collision
-        self.friction: Final[float] = self.object.friction if friction is None else float(friction)
+        own = self.object.friction if self.hand.friction is None else self.hand.friction
+        self.friction: Final[float] = own if friction is None else float(friction)
         self.measure: Final = Measure(
             quality, self.object, self.friction, float(torsion), edges, cones, convention, task
         )

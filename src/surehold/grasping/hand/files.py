@@ -177,6 +177,8 @@ class _Builder:
             joint_names=flat,
             preshapes={name: self._preshape(name, p, flat, lower, upper) for name, p in config.preshapes.items()},
             finger_force=config.finger_force,
+            friction=config.friction,
+            sources=dict(config.sources),
         )
 
     def _check_size(self, rows: list[dict[str, Any]]) -> None:
