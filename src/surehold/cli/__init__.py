@@ -39,6 +39,12 @@ def _run(arguments: list[str]) -> int:
 
     from surehold.cli.application import application
 
+    arguments = [*arguments]
+    if "--check" in arguments[1:] and arguments[0] == "grasp" and arguments[1] != "rate":
+        # alone it means 20; typer wants a value
+        after = arguments.index("--check") + 1
+        if not arguments[after : after + 1] or not arguments[after].lstrip("-").isdigit():
+            arguments.insert(after, "20")
     try:
         code = typer.main.get_command(application())(args=arguments, prog_name="surehold", standalone_mode=False)
         if code == 130:  # what typer makes of Ctrl-C

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from surehold.cli.grasp_check import checked, checker_for
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.grasp_rate import Formats
 from surehold.cli.options import (
@@ -26,18 +27,23 @@ from surehold.cli.options import (
     checked_method,
     noise_of,
 )
-from surehold.errors import unknown_name
+from surehold.errors import InputError, unknown_name
 
 __all__ = ["Outcomes", "grasp"]
 
 _UNSEEN = 0.004  # m; deviation of a surface that counts as not seen
+_OUTCOMES = ("quality", "held")
 _PRESETS = ("thesis", "thesis-grasp")  # both with the simulator of the thesis
 
 
 class Outcomes:
-    """A grasp problem that keeps what came of every trial: the report and the files close no hand again."""
+    """A grasp problem that keeps what came of every trial: the report and the files close no hand again.
 
-    def __init__(self, problem: Any):
+    With a checker a trial gives 1 if the grasp is held, else 0, instead of its quality.
+    """
+
+    def __init__(self, problem: Any, checker: Any = None):
+        self.checker = checker
         self.problem, self.name, self.box, self.warm_up = problem, problem.name, problem.box, problem.warm_up
         self._kept: dict[bytes, Any] = {}
 
@@ -49,7 +55,9 @@ class Outcomes:
         return self._kept[key]
 
     def __call__(self, x: Any) -> float:
-        """Return the quality at x (d,); where the shape is not known, its mean over the shapes."""
+        """Return the quality at x (d,), its mean over the shapes where it is not known; or whether it is held."""
+        if self.checker is not None:
+            return float(self.checker.held([self.grasp(x)])[0])
         return self.problem(x) if self.problem.object.draws else self.grasp(x).quality
 
 
@@ -84,13 +92,28 @@ def grasp(
     out: Out = "",
     study: Study = "",
     storage: StudyStorage = "",
-    check: Annotated[bool, typer.Option("--check", help="Shake the grasps found, by physics (MuJoCo).")] = False,
+    check: Annotated[
+        int | None,
+        typer.Option(
+            "--check",
+            metavar="[N]",
+            help="Shake the grasps found, by physics (MuJoCo), and N of their re-queries each; 20 if no N is given.",
+            show_default=False,
+        ),
+    ] = None,
+    outcome: Annotated[
+        str, typer.Option(help="What a trial gives: quality, or held (success or failure, by physics).")
+    ] = "quality",
     formats: Formats = "isaac",
     open_report: Open = False,
     **options: Any,
 ) -> None:
     """Find a grasp that still holds when the hand is off."""
     checked_method(method)
+    if outcome not in _OUTCOMES:
+        raise unknown_name("outcome of a grasp", outcome, _OUTCOMES)
+    if outcome == "held" and study:
+        raise InputError(f"--outcome held is for runs that are not kept; leave --study {study} out.")
     input_noise = noise_of(noise or "none", method)
 
     from surehold.cli.compilation import announced
@@ -112,29 +135,26 @@ def grasp(
     with announced(console), shown_progress("default pose", console) as progress:
         problem = described_grasp(described, body, progress)
     described["facet"] = problem.facet
-    checker = None
-    if check:
-        from surehold.grasping.physics.check import GraspChecker
-
-        checker = GraspChecker(problem.simulator)  # before the run: without MuJoCo it says so at once
+    checker = checker_for(problem, check, outcome)
     folder = folder_for(f"{problem.object.name} {problem.facet}", method, seed, out, study)
 
-    outcomes = Outcomes(problem)
+    outcomes = Outcomes(problem, checker if outcome == "held" else None)
 
     def describe(candidate: Candidate) -> Candidate:
-        outcome = outcomes.grasp(candidate.x)
-        position = ", ".join(f"{1000 * p:.1f}" for p in outcome.pose.position)
-        turn = ", ".join(f"{q:.3f}" for q in outcome.pose.quaternion)
-        physics = {} if checker is None else {"physics": checked(checker.check(outcome), console)}
+        found = outcomes.grasp(candidate.x)
+        position = ", ".join(f"{1000 * p:.1f}" for p in found.pose.position)
+        turn = ", ".join(f"{q:.3f}" for q in found.pose.quaternion)
+        physics = {} if check is None else checked(checker, outcomes, candidate, check, console)
         return replace(
             candidate,
-            status=outcome.status,
-            pose=f"palm at ({position}) mm, quaternion ({turn}), {posture_text(outcome.s1)}",
-            details={"contacts": str(len(outcome.contacts)), "touching links": touching_links(outcome.touching)}
+            status=found.status,
+            pose=f"palm at ({position}) mm, quaternion ({turn}), {posture_text(found.s1)}",
+            details=dict(candidate.details)
+            | {"contacts": str(len(found.contacts)), "touching links": touching_links(found.touching)}
             | losses(problem, candidate.x, input_noise, seed)
-            | known_at(problem, outcome.contacts.points)
+            | known_at(problem, found.contacts.points)
             | physics,
-            scene=replace(drawn(problem, outcome), neighbors=neighbors_of(problem, candidate)),
+            scene=replace(drawn(problem, found), neighbors=neighbors_of(problem, candidate)),
         )
 
     def also_write(report: RunReport, folder: Path) -> None:
@@ -174,7 +194,8 @@ def grasp(
         describe=describe,
         also_write=also_write,
         units=dict(zip(problem.box.names, problem.units, strict=True)),
-        quality_name=f"quality ({problem.simulator.quality})",
+        quality_name="held (physics)" if outcome == "held" else f"quality ({problem.simulator.quality})",
+        outcome="success" if outcome == "held" else "value",
         disturbance="the hand is off",
         success_above=0.0,
         outcomes=statuses,
@@ -247,15 +268,6 @@ def touching_links(names: Sequence[str]) -> str:
     """Return how many links of each finger touch, from names such as "index distal" and "palm"."""
     counts = Counter(name.partition(" ")[0] for name in names)
     return ", ".join(f"{finger} {n}" if finger != "palm" else finger for finger, n in counts.items()) or "none"
-
-
-def checked(outcome: Any, console: Any) -> str:
-    """Return what physics says of a grasp, and print it."""
-    worst = max(outcome.loads, key=lambda load: load.moved)
-    moved = f"moves {1000 * worst.moved:.1f} mm under {worst.load}" if worst.moved < 1.0 else f"lost under {worst.load}"
-    text = f"{outcome.verdict}, {moved}"
-    console.print(f"physics: {text}")
-    return text
 
 
 def write_grasps(outcomes: Outcomes, report: Any, folder: Path, formats: Sequence[str], words: dict[str, Any]) -> None:

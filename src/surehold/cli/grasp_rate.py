@@ -42,7 +42,6 @@ def _grasp_rate(
     from rich.table import Table
 
     from surehold.cli.compilation import announced
-    from surehold.cli.grasp import checked
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats.gripper import stored_grasp
     from surehold.grasping.formats.writing import checked_formats, write_grasps
@@ -85,7 +84,7 @@ def _grasp_rate(
         if check:
             from surehold.grasping.physics.check import GraspChecker
 
-            row.append(checked(GraspChecker(one.simulator).check(one.grasp), console))
+            row.append(verdict_in_words(GraspChecker(one.simulator).check(one.grasp)))
         table.add_row(*row)
         preshape = one.simulator.hand.preshapes[one.simulator.preshape]
         worth = one.grasp.quality if one.robust is None else one.robust.mean

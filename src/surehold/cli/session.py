@@ -135,8 +135,6 @@ def run_session(
         }
         if outcome != "value":
             options["outcome"] = outcome
-            quality_name, success_above = "success", 0.0
-            advice = "Give more trials, a wider box, or count as success what is easier to reach."
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
         console.print(

@@ -13,6 +13,8 @@ QUALITIES: Final = (
     "simox",
     "task",
     "closure",
+    "min_weight",
+    "balance",
 )  #: see wrench/quality.py
 CONES: Final = ("polyhedral", "round")  #: of friction
 COLLISIONS: Final = ("penalty", "zero")  #: worth of a hand that collides while open: a penalty growing with depth, or 0

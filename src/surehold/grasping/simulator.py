@@ -61,13 +61,13 @@ class Simulator:
         "graded" (soft touch, continuous), "patch" or "single" (one for each touching link).
     quality
         One of `QUALITIES`, explained in quality.py: "epsilon" (radius of the largest ball about the origin in the hull
-        of the wrenches), "signed_epsilon", "volume", "simox", "task" or "closure".
+        of the wrenches), "signed_epsilon", "volume", "simox", "task", "closure", "min_weight" or "balance".
     closing
         "adaptive" (links beyond a touching one go on) or "synergy" (a touch stops the whole finger).
     preshape
         Type of grasp, one of the hand's `preshapes`; the first one if not given ("power" for the iCub).
     friction
-        Coefficient of friction; the object's own if not given.
+        Coefficient of friction; if not given the hand's, where it has one, else the object's own.
     torsion
         Torsional friction of soft fingers: largest moment about the normal by normal force [m], see
         `soft_finger_torsion`; 0 for hard points.
@@ -133,7 +133,8 @@ class Simulator:
         preshape_of(self.hand, preshape)
         self.preshape: Final = preshape or next(iter(self.hand.preshapes))
         self.collision: Final = collision
-        self.friction: Final[float] = self.object.friction if friction is None else float(friction)
+        own = self.object.friction if self.hand.friction is None else self.hand.friction
+        self.friction: Final[float] = own if friction is None else float(friction)
         self.measure: Final = Measure(
             quality, self.object, self.friction, float(torsion), edges, cones, convention, task
         )
@@ -175,7 +176,9 @@ class Simulator:
         touched = np.flatnonzero(closed.touched).tolist()
         touching = tuple(dict.fromkeys(map(self.hand.body_names.__getitem__, touched)))
         if len(contacts) < 2:
-            return Grasp("no contact", 0.0, relative, s1, closed.joints, opened, contacts, touching, 0.0)
+            gaps = self.gaps(relative, closed.joints, geometry)[:-1].reshape(self.hand.radii.shape)
+            worth = self.measure.without_contacts(gaps)
+            return Grasp("no contact", worth, relative, s1, closed.joints, opened, contacts, touching, 0.0)
         wrench = self.measure.wrench(contacts.points, contacts.normals, contacts.weights)
         status: Status = "ok" if wrench.force_closure else "not closed"
         worth = float(self.measure.value(contacts.points, contacts.normals, wrench))

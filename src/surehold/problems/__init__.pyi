@@ -3,6 +3,7 @@
 from .function import Function as Function
 from .function import load_function as load_function
 from .function import parse_bounds as parse_bounds
+from .grasp.held import HeldGrasp as HeldGrasp
 from .grasp.problem import GraspProblem as GraspProblem
 from .named import robust_problem as robust_problem
 from .perturbation import RobustScore as RobustScore

@@ -14,6 +14,8 @@
       index_3: {follows: index_2, factor: 0.8}
     contact_links: [index_tip]     # optional: only these bodies of the fingers can touch; all of them otherwise
     finger_force: 8                # optional: what a stretched finger can exert at its tip [N]
+    friction: 0.6                  # optional: coefficient of its skin on objects; the object's own otherwise
+    sources: {finger_force: maker's data sheet}   # optional: where these two numbers come from, for the report
     preshapes:                     # types of grasp; the first one is the default [rad or m]
       power:
         open: {index_1: 0.1}       # joints that are not named are at 0, or at the nearest end of their range
@@ -24,7 +26,7 @@ Joints that no finger names do not move. Lengths are in meters, angles in radian
 """
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
@@ -97,6 +99,8 @@ class HandConfig(_Strict):
     coupling: dict[str, Coupling] = {}
     contact_links: list[str] | None = None
     finger_force: Annotated[FiniteFloat, Field(gt=0.0, le=1000.0)] = 8.0
+    friction: Annotated[FiniteFloat, Field(gt=0.0, le=10.0)] | None = None
+    sources: dict[Literal["finger_force", "friction"], Annotated[str, Field(max_length=200)]] = {}
     preshapes: Annotated[dict[str, PreshapeConfig], Field(min_length=1)]
     model: PackagedModel | None = None
 

@@ -182,6 +182,8 @@ class _Builder:
             joint_names=flat,
             preshapes={name: self._preshape(name, p, flat, lower, upper) for name, p in config.preshapes.items()},
             finger_force=config.finger_force,
+            friction=config.friction,
+            sources={str(number): source for number, source in config.sources.items()},
         )
 
     def source(self, file: str) -> HandModel:

@@ -125,6 +125,7 @@ def icub_left_hand() -> Hand:
         palm_half_extents=np.array([[0.040, 0.0335, 0.015]]),
         palm_roundings=np.array([0.006]),
         grasp_center=np.array([0.060, 0.010, 0.025]),
+        sources={"finger_force": "assumed: no published figure was found"},
         finger_names=_FINGERS,
         link_names=tuple(f"{finger} {link}" for finger in _FINGERS for link in _LINKS),
         joint_names=tuple(f"{finger}_{link}" for finger in _FINGERS for link in _LINKS),

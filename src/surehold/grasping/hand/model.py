@@ -68,9 +68,10 @@ class Hand:
     joint_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index_distal"; "" for one that does not move
     preshapes: Mapping[str, Preshape] = field(repr=False)  #: grasp types; the first one is the default
     finger_force: float = 8.0  #: what a stretched finger can exert at its tip [N]; the check by physics takes it
-    model: HandModel | None = field(
-        default=None, repr=False
-    )  #: where the hand was read from; None for the built-in ones
+    #: where the hand was read from; None for the built-in ones
+    model: HandModel | None = field(default=None, repr=False)
+    friction: float | None = None  #: coefficient of its skin on what it grasps; None: each object has its own
+    sources: Mapping[str, str] = field(default_factory=dict, repr=False)  #: where finger_force and friction come from
 
     @property
     def palm(self) -> int:

@@ -12,9 +12,14 @@ wrench are in units of force. H is the convex hull of the contacts' wrenches, h(
 | `simox`          | as the simulator of the thesis, see simox.py     | none    | >= 0     | fewer than 2 contacts
 | `task`           | min over t of the largest s with -s t in H       | none    | >= 0     | some t not resisted
 | `closure`        | 1 in force closure, else 0, by linear program    | none    | 0 or 1   | no force closure
+| `min_weight`     | m max l, W' a = 0, sum a = 1, all m a >= l       | none    | 0 to 1   | some wrench not resisted
+| `balance`        | 1 - residual of six pushes, by quadratic program | none    | 0 to 1   | a push is not lessened
 
-epsilon: Ferrari and Canny 1992; task: Li and Sastry 1988. Of the task, gravity in 14 directions is the default: the
-quality is then the weight that is held however the hand is turned, divided by the sum of the normal forces.
+epsilon: Ferrari and Canny 1992; task: Li and Sastry 1988; min_weight: Li et al. 2023; balance: Chen et al. 2024, see
+equilibrium.py. signed_epsilon, after Veiga and Bernardino 2012, also rates hands that touch nothing: minus the distance
+of the object from the fingers, the mean over them, in torque lengths, so that a model has a slope everywhere.
+Of the task, gravity in 14 directions is the default: the quality is then the weight that is held however the hand is
+turned, divided by the sum of the normal forces.
 Round cones are the default. Cones of eight edges underrate epsilon by a few percent on average and by more where few
 contacts hold, and their value depends on where the edges point; round ones cost about a millisecond more. Their
 epsilon is a certified lower bound, `WrenchQuality.upper` the upper one.
@@ -31,6 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.choices import CONES, QUALITIES
 from surehold.grasping.object.model import GraspObject
+from surehold.grasping.wrench.equilibrium import balance_quality, min_weight
 from surehold.grasping.wrench.force_closure import force_closure, gravity_wrenches, task_quality
 from surehold.grasping.wrench.friction_cones import CONVENTIONS, Convention, finite_array
 from surehold.grasping.wrench.simox import ObjectWrenchSpace, object_wrench_space, simox_quality
@@ -106,7 +112,20 @@ class Measure:
             return float(force_closure(wrench.wrenches))
         if self.name == "volume":
             return wrench.volume if wrench.force_closure else 0.0
+        if self.name == "min_weight":
+            return min_weight(wrench.wrenches)
+        if self.name == "balance":
+            return balance_quality(wrench.wrenches, len(wrench.wrenches) // len(points))
         return wrench.epsilon
+
+    def without_contacts(self, gaps: Array) -> float:
+        """Return the measure of a hand with fewer than two contacts and gaps (f, j) between links and object [m].
+
+        0 for all measures but `signed_epsilon`.
+        """
+        if self.name != "signed_epsilon":
+            return 0.0
+        return -float(np.maximum(gaps.min(axis=1), 0.0).mean()) / self.obj.torque_length
 
     @cached_property
     def _object_space(self) -> ObjectWrenchSpace:

@@ -154,7 +154,13 @@ def grasp_default(
     if _is_shipped(obj) and hand.name == "icub-left" and simulator.preshape == "power":
         standoff, s1 = _TABLE[(obj.name, mode)]
         return GraspDefault(standoff * 1e-3, s1)
-    numbers = (np.round(obj.vertices, 9), obj.faces, obj.axes, np.array([obj.friction]), *hand.arrays())
+    numbers = (
+        np.round(obj.vertices, 9),
+        obj.faces,
+        obj.axes,
+        np.array([obj.friction if hand.friction is None else hand.friction]),
+        *hand.arrays(),
+    )
     path = cache_folder() / "defaults" / f"{content_hash(f'{_FORMAT} {simulator.preshape} {mode}', *numbers)}.json"
     known = _load(path)
     if known is None:

@@ -63,11 +63,10 @@ class GraspOptions(TypedDict, total=False):
     """The keyword options of a grasp problem; see `surehold.grasping.Simulator` for those of the simulator."""
 
     contact: Annotated[str, GraspOption("graded", "single, patch or graded (soft touch).", CONTACT_MODELS)]
-    quality: Annotated[
-        str, GraspOption("epsilon", "epsilon, signed_epsilon, volume, simox, task or closure.", QUALITIES)
-    ]
+    quality: Annotated[str, GraspOption("epsilon", f"One of {', '.join(QUALITIES)}.", QUALITIES)]
     friction: Annotated[
-        float | None, GraspOption(None, "Coefficient of friction; by default the object's own.", text=float)
+        float | None,
+        GraspOption(None, "Coefficient of friction; by default the hand's or the object's own.", text=float),
     ]
     torsion: Annotated[float, GraspOption(0.0, "Torsional friction of soft fingers [m]; 0: hard points.", text=float)]
     cones: Annotated[
