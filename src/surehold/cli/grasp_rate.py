@@ -42,6 +42,7 @@ def _grasp_rate(
     from rich.table import Table
 
     from surehold.cli.compilation import announced
+    from surehold.cli.grasp_check import verdict_in_words
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats.gripper import stored_grasp
     from surehold.grasping.formats.writing import checked_formats, write_grasps
