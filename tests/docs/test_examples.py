@@ -54,10 +54,11 @@ def parsed(arguments):
     """Read a command as the command line does, without running it."""
     import typer
 
+    from surehold.cli import completed
     from surehold.cli.application import application
 
-    command = typer.main.get_command(application())
-    context = command.make_context("surehold", list(arguments))
+    command, arguments = typer.main.get_command(application()), completed(list(arguments))
+    context = command.make_context("surehold", arguments)
     while hasattr(command, "get_command"):
         name, command, arguments = command.resolve_command(context, [*context._protected_args, *context.args])
         context = command.make_context(name, list(arguments), parent=context)

@@ -55,4 +55,4 @@ def test_straying_trials_do_not_count_the_input_noise_twice():
     best = optimizer.recommend()
     values = np.sin(6.0 * (best.x[0] + 0.05 * np.random.default_rng(0).standard_normal(20_000)))
     twice = float(np.sqrt(2.0) * values.std())
-    assert best.std < max(twice, 0.15)
+    assert best.std < max(twice, 0.2), "with what trials strayed as observation noise it would be 0.3 and more"

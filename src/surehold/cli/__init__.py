@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 
-__all__ = ["main"]
+__all__ = ["completed", "main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -39,14 +39,10 @@ def _run(arguments: list[str]) -> int:
 
     from surehold.cli.application import application
 
-    arguments = [*arguments]
-    if "--check" in arguments[1:] and arguments[0] == "grasp" and arguments[1] != "rate":
-        # alone it means 20; typer wants a value
-        after = arguments.index("--check") + 1
-        if not arguments[after : after + 1] or not arguments[after].lstrip("-").isdigit():
-            arguments.insert(after, "20")
     try:
-        code = typer.main.get_command(application())(args=arguments, prog_name="surehold", standalone_mode=False)
+        code = typer.main.get_command(application())(
+            args=completed(arguments), prog_name="surehold", standalone_mode=False
+        )
         if code == 130:  # what typer makes of Ctrl-C
             return _interrupted()
         return code if isinstance(code, int) else 0
@@ -62,6 +58,15 @@ def _run(arguments: list[str]) -> int:
         return int(getattr(error, "exit_code", 2))
     except typer.Abort:
         return _interrupted()
+
+
+def completed(arguments: list[str]) -> list[str]:
+    """Return arguments in which `--check` of a grasp has its number, 20 where none is given: typer wants one."""
+    if arguments[:1] != ["grasp"] or arguments[1:2] == ["rate"] or "--check" not in arguments:
+        return arguments
+    after = arguments.index("--check") + 1
+    alone = not arguments[after : after + 1] or not arguments[after].lstrip("-").isdigit()
+    return [*arguments[:after], "20", *arguments[after:]] if alone else arguments
 
 
 def _interrupted() -> int:
