@@ -266,3 +266,11 @@ def test_of_an_output_that_was_never_measured_nothing_is_promised():
     safe.tell(safe.ask(), 1.0, constraints={"torque": None})
     with pytest.raises(SureholdError, match="nothing is known to be safe: none of 1 trials has measured torque"):
         safe.ask()
+
+
+def test_while_nothing_is_told_safe_mode_asks_for_what_is_trusted():
+    settings = {"constraints": {"t": (None, 1.0)}, "safety": 0.9, "initial_points": [[0.5, 0.5]]}
+    optimizer = Optimizer(BOX, **settings)
+    assert np.array_equal(optimizer.ask(2), [[0.5, 0.5], [0.5, 0.5]])
+    with pytest.raises(SureholdError, match="ask for the initial points first"):
+        Optimizer(BOX, **settings).ask(number=3)

@@ -312,12 +312,15 @@ class Requirements:
 
     def otherwise(self, trials: Trials, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return a point (d,) to try where no candidate is left: a random one; in safe mode the safest tried one."""
-        if self.safety is not None:
+        if self.safety is not None and len(trials):
             return trials.places[int(np.argmax(np.where(trials.eligible, self.feasibility(trials), -1.0)))]
+        if self.safety is not None:
+            if not len(trials.pending):
+                raise SureholdError("nothing is known to be safe yet; ask for the initial points first.")
+            return trials.pending[0]  # one of the initial points, which are trusted
         points = np.concatenate([trials.places, trials.pending])
-        if (
-            self.failures and len(points) and not trials.successful.any()
-        ):  # nothing has succeeded: where nothing has been tried
+        # nothing has succeeded: where nothing has been tried
+        if self.failures and len(points) and not trials.successful.any():
             holes = largest_holes(points, rng, self.admission(trials))
             if len(holes):
                 return holes[0]
