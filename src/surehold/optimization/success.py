@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,10 @@ from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.recommendation import Outcome, Recommendation
 from surehold.optimization.surrogates.protocol import Posterior
 
-__all__ = ["check_combination", "counted", "described"]
+__all__ = ["MOST_EXECUTIONS", "check_combination", "counted", "described"]
+
+#: Executions of one trial; more tell nothing more, and could not be counted exactly in their share.
+MOST_EXECUTIONS: Final = 1_000_000
 
 
 def check_combination(settings: Mapping[str, Any]) -> None:
@@ -73,6 +76,8 @@ def counted(
     for name, value, least in (("of", of, 1), ("successes", successes, 0)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
             raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
+    if of > MOST_EXECUTIONS:
+        raise InputError(f"of is {of!r}; give at most {MOST_EXECUTIONS} executions a trial.")
     if successes > of:
         raise InputError(f"successes are {successes} of {of}; there cannot be more than executions.")
     return successes / of, int(of), False
