@@ -219,9 +219,9 @@ def test_the_beta_process_takes_whole_numbers():
     box = sh.Box({"x": (0.0, 1.0), "n": (1, 5, "int")})
     optimizer = sh.Optimizer(box, outcome="success", surrogate="beta_process", seed=0)
     rng = np.random.default_rng(0)
-    X = np.column_stack([rng.random(300), rng.integers(1, 6, 300)])
+    X = np.column_stack([rng.random(301), rng.integers(1, 6, 301)])  # after the 300th a hole would be filled
     p = 0.9 * np.exp(-0.5 * ((X[:, 0] - 0.6) / 0.1) ** 2) * (X[:, 1] == 3)
-    optimizer.restore(X, (rng.random(300) < p).astype(float))
+    optimizer.restore(X, (rng.random(301) < p).astype(float))
     asked, best = optimizer.ask_trial().parameters, optimizer.recommend()
     assert asked["n"] == 3
     assert best.x[1] == 3
