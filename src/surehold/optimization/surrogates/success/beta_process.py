@@ -163,7 +163,8 @@ class BetaProcess:
         Counts (a, b) of successes and failures before any trial, positive; (1, 1) is the uniform distribution.
     length_scales
         Fixed length-scales (d,) in box widths. None (default): the most probable ones, by the likelihood of each place
-        given all others, and the prior of `GaussianProcess`; of many places as many as 200 are left out in turn.
+        given all others (with a prior of the same weight about the share of all trials) and the prior of
+        `GaussianProcess`; of many places as many as 200 are left out in turn.
 
     Raises
     ------
@@ -219,9 +220,13 @@ class BetaProcess:
         d = X.shape[1]
         rows = np.unique(np.linspace(0, len(X) - 1, min(len(X), MANY_LEARNT)).round().astype(np.intp))
         middle = log(LENGTH_SCALE_MEDIAN * sqrt(d))
+        # About the share of all trials: about 1/2, wide kernels would be likelier only because more counts outweigh it.
+        a, b = self._prior
+        share = (a + successes.sum()) / (a + b + successes.sum() + failures.sum())
+        prior = (a + b) * share, (a + b) * (1.0 - share)
 
         def loss(logs: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-            value, slope = left_out_likelihood(np.exp(logs), X, successes, failures, self._prior, rows)
+            value, slope = left_out_likelihood(np.exp(logs), X, successes, failures, prior, rows)
             z = (logs - middle) / LENGTH_SCALE_DEVIATION
             return float(0.5 * z @ z - value), z / LENGTH_SCALE_DEVIATION - slope
 
