@@ -9,6 +9,7 @@ from surehold.optimization.surrogates.gaussian_process.kernels import correlatio
 from surehold.optimization.surrogates.success.laplace import Counts, laplace, log_posterior, prior_covariance
 from surehold.optimization.surrogates.success.model import SuccessProcess
 from surehold.optimization.surrogates.success.posterior import probability
+from surehold.optimization.surrogates.success.propagation import propagated
 
 L, S2 = np.array([0.3, 0.5]), 1.5
 
@@ -95,6 +96,23 @@ def test_probabilities_are_those_of_exact_sampling():
     exact = total / kept
     ours = fixed(X, y).moments(Q).mean[0]
     assert np.abs(ours - exact).max() < 0.01
+
+
+@pytest.mark.parametrize(("successes", "of"), [(1, 1), (5, 7), (0, 3)])
+def test_evidence_and_mean_of_a_single_place_are_exact(successes, of):
+    """With one site expectation propagation has nothing to approximate: one integral over f."""
+    v, s, r = 2.5, np.array([float(successes)]), np.array([float(of)])
+
+    def integral(power):
+        return integrate.quad(
+            lambda f: f**power * ndtr(f) ** successes * ndtr(-f) ** (of - successes) * stats.norm.pdf(f, 0.0, v**0.5),
+            -15.0,
+            15.0,
+        )[0]
+
+    sites = propagated(np.array([[v]]), s, r, np.full(1, 0.1), np.zeros(1))
+    assert sites.log_evidence == pytest.approx(np.log(integral(0)), abs=1e-4)
+    assert v * sites.alpha[0] == pytest.approx(integral(1) / integral(0), abs=1e-4)
 
 
 def test_moments_of_the_probability_by_quadrature():

@@ -25,7 +25,7 @@ from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.surrogates.success.laplace import Counts, log_posterior
 from surehold.optimization.surrogates.success.posterior import SuccessPosterior
 
-__all__ = ["SuccessProcess"]
+__all__ = ["SuccessProcess", "counted"]
 
 _REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
 
@@ -106,18 +106,28 @@ class SuccessProcess:
         return SuccessPosterior(counts, *self._learnt[key])
 
     def _counts(self, X: NDArray[np.float64], successes: NDArray[np.float64], trials: NDArray[np.float64]) -> Counts:
-        """Return the data, trials of the same input put together."""
-        places, which = np.unique(X, axis=0, return_inverse=True)
-        d = X.shape[1]
-        prior = [(log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION)] * d + [SUCCESS_SIGNAL_PRIOR]
-        mean, deviation = np.array(prior).T
-        return Counts(
-            np.ascontiguousarray(places, dtype=np.float64),
-            np.bincount(which.ravel(), successes, len(places)).astype(np.float64),
-            np.bincount(which.ravel(), trials, len(places)).astype(np.float64),
-            np.ascontiguousarray(mean),
-            np.ascontiguousarray(deviation),
-            NUGGET,
-            self._mean_variance,
-            self._kernel,
-        )
+        return counted(X, successes, trials, self._kernel, self._mean_variance)
+
+
+def counted(
+    X: NDArray[np.float64],
+    successes: NDArray[np.float64],
+    trials: NDArray[np.float64],
+    kernel: int,
+    mean_variance: float = SUCCESS_MEAN_VARIANCE,
+) -> Counts:
+    """Return the data of this many successes of trials (n,) at X (n, d), trials of the same input put together."""
+    places, which = np.unique(X, axis=0, return_inverse=True)
+    d = X.shape[1]
+    prior = [(log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION)] * d + [SUCCESS_SIGNAL_PRIOR]
+    mean, deviation = np.array(prior).T
+    return Counts(
+        np.ascontiguousarray(places, dtype=np.float64),
+        np.bincount(which.ravel(), successes, len(places)).astype(np.float64),
+        np.bincount(which.ravel(), trials, len(places)).astype(np.float64),
+        np.ascontiguousarray(mean),
+        np.ascontiguousarray(deviation),
+        NUGGET,
+        mean_variance,
+        kernel,
+    )
