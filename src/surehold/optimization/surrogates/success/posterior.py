@@ -156,7 +156,7 @@ class SuccessPosterior:
 
 
 def sites_of(counts: Counts, theta: NDArray[np.float64]) -> Sites:
-    """Return the sites under the hyperparameters theta (d + 1,): expectation propagation from Laplace's approximation."""
+    """Return the sites under the hyperparameters theta (d + 1,), from Laplace's approximation on."""
     n = len(counts.X)
     K, L, a, W = np.empty((n, n)), np.empty((n, n)), np.empty(n), np.empty(n)
     prior_covariance(theta, counts, K)

@@ -82,7 +82,8 @@ def _marginals(
     root = np.sqrt(tau)
     lower = np.linalg.cholesky(np.eye(len(tau)) + root[:, None] * K * root)
     solved = solve_triangular(lower, root[:, None] * K, lower=True, check_finite=False)
-    return K @ nu - solved.T @ (solved @ nu), np.diag(K) - np.square(solved).sum(axis=0), lower
+    variance = np.diag(K) - np.square(solved).sum(axis=0)
+    return K @ nu - solved.T @ (solved @ nu), variance, np.asarray(lower, dtype=np.float64)
 
 
 def _tilted(
