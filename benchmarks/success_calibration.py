@@ -1,12 +1,14 @@
 """Do stated probabilities of success come true? `python -m benchmarks.success_calibration [--seeds 100] [--trials 40]`.
 
-One run a seed and row: the optimizer asks for its trials, each of which succeeds or fails; then its probabilities are
-compared with the true ones at 256 points of a Sobol sequence (`anywhere`), at each trial that it chose, before it was
-told (`next trial`), and at the recommended input (`answer`). Rows:
+One run a seed and row: trials succeed or fail; then the stated probabilities are compared with the true ones at 256
+points of a Sobol sequence (`anywhere`), at each trial that the optimizer chose, before it was told (`next trial`), and
+at the recommended input (`answer`). Rows:
 
-    drawn       p(x) = Phi(f(x)), f of two variables drawn from the prior that the model assumes, hyperparameters too
-    published   rkhs, gm and nes-polynomial in turn, p(x) = Phi(2.5 z(x)) of the standardized function
-    counted     as drawn, by `surrogate="beta_process"`
+    random      p(x) = Phi(f(x)), f of two variables drawn from the prior that the model assumes, hyperparameters too;
+                trials at random inputs, six times as many runs
+    asked       the same, trials that the optimizer asks for
+    counted     as asked, by `surrogate="beta_process"`
+    published   as asked, rkhs, gm and nes-polynomial in turn, p(x) = Phi(2.5 z(x)) of the standardized function
 
 Printed: for each tenth of the stated probability its mean, the mean true probability, and their difference in standard
 errors, those of sums over seeds: points of one run are not independent.
@@ -28,7 +30,7 @@ from surehold.defaults import (
     SUCCESS_SIGNAL_PRIOR,
 )
 
-ROWS = ("drawn", "published", "counted")
+ROWS = ("random", "asked", "counted", "published")
 PUBLISHED = ("rkhs", "gm", "nes-polynomial")
 WHERE = ("anywhere", "next trial", "answer")
 
@@ -56,9 +58,9 @@ def one(row, seed, trials):
     settings = {"surrogate": "beta_process"} if row == "counted" else {}
     optimizer, found = sh.Optimizer(box, outcome="success", seed=seed, **settings), []
     for t in range(trials):
-        x = optimizer.ask()
+        x = box.from_unit(rng.random(box.dimension)) if row == "random" else optimizer.ask()
         true = p(x)
-        if t >= optimizer.n_initial:
+        if row != "random" and t >= optimizer.n_initial:
             found.append((1, optimizer.predict(x[None])[0][0], true))
         optimizer.tell(x, success=bool(rng.random() < true))
     queries = box.from_unit(qmc.Sobol(box.dimension, rng=rng).random(256))
@@ -90,12 +92,16 @@ def main():
     arguments = parser.parse_args()
     kept = {}
     for row in arguments.rows:
-        runs = [np.array(one(row, seed, arguments.trials)) for seed in range(arguments.seeds)]
+        runs = [
+            np.array(one(row, seed, arguments.trials)) for seed in range(arguments.seeds * (1 + 5 * (row == "random")))
+        ]
         seeds = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
         kept[row] = np.column_stack([seeds, np.concatenate(runs)])
         if arguments.keep:
             np.savez_compressed(arguments.keep, **kept)
         for w, where in enumerate(WHERE):
+            if not np.any(kept[row][:, 1] == w):
+                continue
             seeds, _, stated, true = kept[row][kept[row][:, 1] == w].T
             for k, said, is_so, error, n in table(stated, true, seeds.astype(int)):
                 off = (is_so - said) / error
