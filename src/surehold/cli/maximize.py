@@ -16,6 +16,7 @@ from surehold.cli.options import (
     Seed,
     Study,
     StudyStorage,
+    Surrogate,
     Trials,
     checked_method,
     limits_given,
@@ -65,6 +66,7 @@ def maximize(
     initial: Initial = None,
     noise: Noise = None,
     seed: Seed = 0,
+    surrogate: Surrogate = "",
     preset: Preset = "",
     out: Out = "",
     study: Study = "",
@@ -112,13 +114,18 @@ def maximize(
         preset=preset,
         folder=folder_for(chosen.name, method, seed, out, study),
         open_report=open_report,
-        settings={"problem": problem, "bounds": bounds or None, "input noise": noise_text},
+        settings={
+            "problem": problem,
+            "bounds": bounds or None,
+            "input noise": noise_text,
+            "surrogate": surrogate or None,
+        },
         direction=direction,
         outcome=outcome,
         **(_SUCCESSES if outcome == "success" else {}),
         tolerate_failures=tolerate_failures,
         kept=kept,
-        required=limits_given(constraint, allowed, feasible),
+        required=limits_given(constraint, allowed, feasible) | ({"surrogate": surrogate} if surrogate else {}),
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)

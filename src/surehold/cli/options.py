@@ -20,6 +20,7 @@ __all__ = [
     "Seed",
     "Study",
     "StudyStorage",
+    "Surrogate",
     "Trials",
     "checked_method",
     "limits_given",
@@ -41,6 +42,14 @@ Out = Annotated[
     ),
 ]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser at the end.")]
+Surrogate = Annotated[
+    str,
+    typer.Option(
+        help="The model: two_scales (default), gp, tgp, local_global; with --outcome success: probit (default), "
+        "beta_process.",
+        show_default=False,
+    ),
+]
 Preset = Annotated[str, typer.Option(help="Settings by name, such as thesis.", show_default=False)]
 Study = Annotated[
     str,

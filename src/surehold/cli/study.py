@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from surehold.cli import study_people, study_service
-from surehold.cli.options import Allowed, Constraint
+from surehold.cli.options import Allowed, Constraint, Surrogate
 from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, quiet, say, write_out
 
 __all__ = ["studies"]
@@ -61,7 +61,7 @@ def create(
     ] = "",
     seed: Annotated[int, typer.Option(help="Same seed, same suggestions.")] = 0,
     initial: Annotated[int | None, typer.Option(help="Trials of the initial design.")] = None,
-    surrogate: Annotated[str, typer.Option(help="two_scales (default), gp or tgp (default from 400 trials on).")] = "",
+    surrogate: Surrogate = "",
     criterion: Annotated[str, typer.Option(help="As in surehold.Optimizer.", show_default=False)] = "",
     risk: Annotated[str, typer.Option(help="mean, mean-std, var, cvar or worst.")] = "mean",
     observation_noise: Annotated[

@@ -30,7 +30,7 @@ from surehold.optimization.strategy.named import strategy_named
 from surehold.optimization.strategy.protocol import Strategy
 from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.strategy.trust_region import TrustRegion
-from surehold.optimization.success import BETA_PROCESS, check_combination, success_surrogate
+from surehold.optimization.success import SUCCESS_SURROGATES, check_combination, success_surrogate
 from surehold.optimization.surrogates.named import TELLABLE
 from surehold.optimization.surrogates.protocol import NoisySurrogate
 from surehold.optimization.surrogates.success.beta_process import BetaProcess
@@ -86,8 +86,8 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     _check(s)
     if s.outcome == "success":
         check_combination(settings)
-    elif isinstance(s.surrogate, str) and s.surrogate == BETA_PROCESS:
-        raise InputError(f"surrogate='{BETA_PROCESS}' counts successes; say outcome='success' beside it.")
+    elif isinstance(s.surrogate, str) and s.surrogate in SUCCESS_SURROGATES:
+        raise InputError(f"surrogate='{s.surrogate}' is of successes; say outcome='success' beside it.")
     seed = whole_number("seed", s.seed, 0)
     input_noise = noise_of_coordinates(s.input_noise, box)
     straying = input_noise if s.noise_while_exploring else None

@@ -7,32 +7,42 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import InputError
+from surehold.errors import InputError, unknown_name
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.recommendation import Outcome, Recommendation
+from surehold.optimization.surrogates.named import SURROGATES
 from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.surrogates.success.beta_process import BetaProcess
 from surehold.optimization.surrogates.success.model import SuccessProcess
 
-__all__ = ["BETA_PROCESS", "MOST_EXECUTIONS", "check_combination", "counted", "described", "success_surrogate"]
+__all__ = [
+    "MOST_EXECUTIONS",
+    "SUCCESS_SURROGATES",
+    "check_combination",
+    "counted",
+    "described",
+    "success_surrogate",
+]
 
-#: Name of the surrogate that counts successes near by.
-BETA_PROCESS: Final = "beta_process"
+#: Names of the surrogates of successes; the first is what None stands for.
+SUCCESS_SURROGATES: Final = ("probit", "beta_process")
 #: Executions of one trial; more tell nothing more, and could not be counted exactly in their share.
 MOST_EXECUTIONS: Final = 1_000_000
 
 
 def success_surrogate(surrogate: Any) -> SuccessProcess | BetaProcess:
     """Return the surrogate of successes that a setting stands for; raises InputError where it is none."""
-    if surrogate is None:
+    if surrogate is None or surrogate == "probit":
         return SuccessProcess()
     if isinstance(surrogate, (SuccessProcess, BetaProcess)):
         return surrogate
-    if surrogate == BETA_PROCESS:
+    if surrogate == "beta_process":
         return BetaProcess()
+    if isinstance(surrogate, str) and surrogate not in SURROGATES:
+        raise unknown_name("surrogate of successes", surrogate, SUCCESS_SURROGATES)
     raise InputError(
-        f"surrogate={surrogate!r} cannot be combined with outcome='success', whose model is of probabilities; leave it "
-        f"out for a Gaussian process behind a probit likelihood, or say '{BETA_PROCESS}' for counts near by."
+        f"surrogate={surrogate!r} cannot be combined with outcome='success', whose model is of probabilities; choose "
+        f"one of: {', '.join(SUCCESS_SURROGATES)}."
     )
 
 
