@@ -256,8 +256,8 @@ def test_of_many_successes_the_early_ones_are_not_all_that_is_looked_at():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"surrogate": "beta_process"}, "counts successes; say outcome='success'"),
-        ({"surrogate": "beta", "outcome": "success"}, "surrogate='beta' cannot be combined .*'beta_process'"),
+        ({"surrogate": "beta_process"}, "is of successes; say outcome='success'"),
+        ({"surrogate": "beta", "outcome": "success"}, "'beta' is unknown; choose one of: probit, beta_process"),
         ({"surrogate": sh.GaussianProcess(), "outcome": "success"}, "cannot be combined with outcome='success'"),
     ],
 )

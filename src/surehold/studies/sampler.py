@@ -18,7 +18,7 @@ from optuna.search_space import IntersectionSearchSpace
 from optuna.study import Study, StudyDirection
 from optuna.trial import FrozenTrial
 
-from surehold.defaults import MANY
+from surehold.defaults import MANY, SUCCESS_PLACES
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
@@ -50,7 +50,8 @@ class Sampler(BaseSampler):
         Non-negative integer.
     surrogate
         As in `Optimizer`, whose default None stands for. It carries tens of thousands of trials: from
-        `surehold.defaults.MANY` on a place is judged by the trials near it, which is said once.
+        `surehold.defaults.MANY` on a place is judged by the trials near it (of successes, from `SUCCESS_PLACES` on near
+        ones count together), which is said once.
     warn_independent_sampling
         Whether to warn when a parameter is drawn at random because it is not in the search space.
     **settings
@@ -211,10 +212,11 @@ class Sampler(BaseSampler):
             key = (tuple(space.distributions.items()), direction)
             if self._kept is None or self._kept[0] != key:
                 self._kept = (key, self._new_optimizer(space, direction))
-            if len(history.y) > MANY and not self._said:
-                self._said = True
-                _log.warning(f"The study has more than {MANY} trials: a place is judged by those near it from now on.")
             optimizer = self._kept[1]
+            many = SUCCESS_PLACES if optimizer.outcome == "success" else MANY
+            if len(history.y) > many and not self._said:
+                self._said = True
+                _log.warning(f"The study has more than {many} trials: a place is judged by those near it from now on.")
             optimizer.restore(
                 history.X,
                 history.y,

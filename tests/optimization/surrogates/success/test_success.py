@@ -6,6 +6,7 @@ from scipy import integrate, optimize, stats
 from scipy.special import log_ndtr, ndtr
 
 from surehold.optimization.surrogates.gaussian_process.kernels import correlation
+from surehold.optimization.surrogates.success import model
 from surehold.optimization.surrogates.success.laplace import Counts, laplace, log_posterior, prior_covariance
 from surehold.optimization.surrogates.success.model import SuccessProcess
 from surehold.optimization.surrogates.success.posterior import probability
@@ -162,6 +163,28 @@ def test_repeated_trials_are_counts():
     outcomes = np.concatenate([[1.0] * round(4 * v) + [0.0] * (4 - round(4 * v)) for v in y])
     Q = np.random.default_rng(2).random((5, 2))
     np.testing.assert_allclose(fixed(X, y, 4).moments(Q).mean, fixed(single, outcomes).moments(Q).mean, atol=1e-12)
+
+
+def test_of_many_trials_the_near_ones_count_together(monkeypatch):
+    """Nothing is lost, and what is said is what all trials say, nearly: places of a hundred stand for 500 trials."""
+    rng = np.random.default_rng(3)
+    X = np.concatenate([rng.random((150, 2)), np.clip(0.6 + 0.06 * rng.standard_normal((350, 2)), 0.0, 1.0)])
+    y = (rng.random(500) < ndtr(1.5 - 8.0 * ((X - 0.6) ** 2).sum(axis=1))).astype(float)
+    Q = np.concatenate([rng.random((50, 2)), 0.6 + 0.06 * rng.standard_normal((50, 2))])
+    monkeypatch.setattr(model, "SUCCESS_PLACES", 500)
+    every = fixed(X, y)
+    assert len(every.counts.X) == 500
+    monkeypatch.setattr(model, "SUCCESS_PLACES", 100)
+    some = fixed(X, y)
+    assert 90 < len(some.counts.X) <= 100
+    assert some.counts.trials.sum() == 500.0
+    assert some.counts.successes.sum() == y.sum()
+    assert some.counts.trials @ some.counts.X == pytest.approx(X.sum(axis=0))
+    every, some = every.moments(Q), some.moments(Q)
+    off = np.abs(some.mean - every.mean)[0]
+    assert off.max() < 0.06
+    assert off[50:].max() < 0.015  # where most trials are, places are near each other
+    assert np.abs(np.sqrt(some.variance) - np.sqrt(every.variance)).max() < 0.03
 
 
 def test_pending_trials_narrow_and_move_nothing():
