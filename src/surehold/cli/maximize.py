@@ -7,12 +7,15 @@ import typer
 from surehold.cli.options import (
     Allowed,
     Constraint,
+    Failures,
+    First,
     Initial,
     Method,
     Noise,
     Open,
     Out,
     Preset,
+    Safety,
     Seed,
     Study,
     StudyStorage,
@@ -79,6 +82,9 @@ def maximize(
     feasible: Annotated[
         float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
     ] = 0.0,
+    failures: Failures = "",
+    safety: Safety = 0.0,
+    first: First = None,
     outcome: Annotated[
         str, typer.Option(help="What a trial gives: value, or success (your function returns True or False).")
     ] = "value",
@@ -125,7 +131,8 @@ def maximize(
         **(_SUCCESSES if outcome == "success" else {}),
         tolerate_failures=tolerate_failures,
         kept=kept,
-        required=limits_given(constraint, allowed, feasible) | ({"surrogate": surrogate} if surrogate else {}),
+        required=limits_given(constraint, allowed, feasible, failures, safety, first)
+        | ({"surrogate": surrogate} if surrogate else {}),
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)

@@ -56,9 +56,9 @@ class Sampler(BaseSampler):
         Whether to warn when a parameter is drawn at random because it is not in the search space.
     **settings
         Of `Optimizer`: criterion, n_initial, design, noise, output_range, quadrature, k, border, kappa, risk, preset,
-        allowed, constraints, feasible. A function `allowed` takes the parameters {name: value}. The further outputs of
-        a trial are its attributes of that name: `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets
-        start anew for every suggestion.
+        allowed, constraints, feasible, safety, failures, initial_points, outcome. A function `allowed` takes the
+        parameters {name: value}. The further outputs of a trial are its attributes of that name:
+        `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets start anew for every suggestion.
 
     The direction of the study decides whether values are maximized or minimized; several objectives are refused.
 
@@ -196,8 +196,10 @@ class Sampler(BaseSampler):
 
     def n_initial(self, space: SearchSpace) -> int:
         """Return the size of the initial design in a search space."""
-        given = self._settings.get("n_initial")
-        return Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given
+        given, first = self._settings.get("n_initial"), len(self._settings.get("initial_points") or ())
+        if self._settings.get("safety") is not None:
+            return first
+        return max(Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given, first)
 
     @contextmanager
     def optimizing(self, space: SearchSpace, history: History, direction: str) -> Iterator[Optimizer]:
