@@ -22,8 +22,8 @@ def test_answers_and_traces(gm_result, gm_report):
 
 def test_the_answer_over_conditions_is_the_trial_of_its_setting():
     """The nearest trial in all variables would be one of another setting, made at about the mean condition."""
-    box = sh.Box({"x": (0.0, 1.0)}, uncontrolled={"w": [0.0, 0.5, 1.0]})
-    result = sh.maximize(lambda p: -((p[0] - 0.6) ** 2) + 0.1 * p[1], box, 14, seed=0)
+    box = sh.Box({"x": (0.0, 1.0)}, uncontrolled={"w": [0.0, 0.0, 0.5, 1.0, 1.0]})
+    result = sh.maximize(lambda p: -((p[0] - 0.6) ** 2) * (1.0 + p[1]), box, 9, seed=0)
     x = result.recommendation.x
     index = gather.answers(result)["recommended"]
     assert result.X[index, 0] == pytest.approx(x[0], abs=1e-9)
