@@ -124,7 +124,7 @@ def grasp(objects, args):
             trusted = (
                 belief if belief.surface.prior is belief.surface.first else belief.with_surface(belief.surface.prior)
             )
-            problem = GraspProblem(mean)
+            problem = GraspProblem(mean, plan="shapes")
             real = problem.on(obj)
             row = {}
             for method, body in (

@@ -55,10 +55,10 @@ class Outcomes:
         return self._kept[key]
 
     def __call__(self, x: Any) -> float:
-        """Return the quality at x (d,), its mean over the shapes where it is not known; or whether it is held."""
+        """Return the quality at x (d,), its mean over the shapes with --plan shapes; or whether it is held."""
         if self.checker is not None:
             return float(self.checker.held([self.grasp(x)])[0])
-        return self.problem(x) if self.problem.object.draws else self.grasp(x).quality
+        return self.problem(x) if self.problem.averaged else self.grasp(x).quality
 
 
 def simulator_preset(preset: str) -> str:

@@ -152,7 +152,8 @@ class Exploration:
         if felt:
             surface = self.belief.surface
             told = replace(self._felt, free=self._free)
-            self.belief = self.belief.with_surface(surface_of(surface.prior, told, surface.std, surface.length))
+            learnt = surface_of(surface.prior, told, surface.std, surface.length)
+            self.belief = self.belief.with_surface(learnt, np.vstack([each.free for each in felt]))
 
     def recommend(self, tried: bool = False) -> ExploredGrasp:
         """Return the grasp that is expected to hold best under shape and hand noise; `tried`: of the trials told."""
