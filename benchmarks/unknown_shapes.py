@@ -32,6 +32,7 @@ from surehold.grasping.shape.completion import SPREAD, belief_of_cloud
 from surehold.grasping.shape.implicit_surface import Observations
 from surehold.grasping.shape.point_cloud import cleaned
 from surehold.grasping.shape.views import camera_towards, half_view, hidden_mask, surface_points
+from surehold.problems.grasp.default_poses import default_facet
 from surehold.problems.grasp.exploration import Exploration, belief_of_box
 from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.grasp.touch import touch_trial
@@ -124,7 +125,7 @@ def grasp(objects, args):
             trusted = (
                 belief if belief.surface.prior is belief.surface.first else belief.with_surface(belief.surface.prior)
             )
-            problem = GraspProblem(mean, plan="shapes")
+            problem = GraspProblem(mean, default_facet(obj), plan="shapes")
             real = problem.on(obj)
             row = {}
             for method, body in (

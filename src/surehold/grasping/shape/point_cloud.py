@@ -243,8 +243,8 @@ def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Ar
             carried |= mine
         elif far[largest].max() < 0.5 * far[mine].min() and sizes[number] >= 0.05 * sizes[order[0]]:
             raise InputError(
-                f"{np.sum(largest):,} points within {1e3 * far[largest].max():.0f} mm of the camera are before an object "
-                f"of {sizes[number]:,} points; take out those of the hand that carries the camera, or give one object."
+                f"{np.sum(largest):,} points within {1e3 * far[largest].max():.0f} mm of the camera stand before "
+                f"{sizes[number]:,} others; take out those of the hand that carries the camera, or give one object."
             )
         elif sizes[number] >= 0.2 * sizes[order[0]]:
             raise InputError(
