@@ -12,7 +12,7 @@ object: what else a draw of f makes negative is no part of one rigid object.
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +73,7 @@ def one_piece(values: Array, measured: NDArray[np.intp] | None = None) -> Array:
     from scipy.ndimage import label, maximum_filter
 
     inside = values < 0.0
-    parts, count = label(inside)  # type: ignore[misc]
+    parts, count = cast("tuple[NDArray[np.int32], int]", label(inside))
     if count == 0:
         raise SureholdError("the surface encloses nothing on its grid; its observations leave no room for an object.")
     if count == 1:
