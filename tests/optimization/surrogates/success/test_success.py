@@ -199,7 +199,7 @@ def test_pending_trials_narrow_and_move_nothing():
 
 def test_log_posterior_adds_the_prior():
     X, y = data(15)
-    counts = Counts(X, y, np.ones(15), np.zeros(3), np.ones(3), 1e-10, 1.0, 0)
+    counts = Counts(X, y, np.ones(15), np.zeros(3), np.ones(3), 1e-10, 1.0, 0, np.empty((0, 2), dtype=np.int64))
     theta = np.array([-1.0, -0.5, 0.4])
     K = np.empty((15, 15))
     prior_covariance(theta, counts, K)

@@ -29,7 +29,7 @@ from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.surrogates.success.laplace import Counts, log_posterior
 from surehold.optimization.surrogates.success.posterior import SuccessPosterior
 
-__all__ = ["SuccessProcess", "counted"]
+__all__ = ["SuccessProcess", "counted", "learnt"]
 
 _REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
 _LLOYD: Final = 10  # rounds of the clustering
@@ -97,23 +97,28 @@ class SuccessProcess:
         key = fingerprint(X[some], y[some], of[some], stream)
         if key not in self._learnt:
             early = self._counts(X[some], (y * of)[some], of[some])
-            samples = elliptical_slice_sample(
-                log_posterior,
-                early,
-                early.prior_mean,
-                np.diag(early.prior_deviation),
-                np.random.default_rng([stream, k]),
-                keep=PARTICLES,
-                burn_in=SUCCESS_BURN_IN,
-                thin=THIN,
-            )
-            self._learnt[key] = samples.states, samples.evaluations
+            self._learnt[key] = learnt(early, np.random.default_rng([stream, k]))
             while len(self._learnt) > _REMEMBERED:
                 self._learnt.popitem(last=False)
         return SuccessPosterior(counts, *self._learnt[key])
 
     def _counts(self, X: NDArray[np.float64], successes: NDArray[np.float64], trials: NDArray[np.float64]) -> Counts:
         return counted(X, successes, trials, self._kernel, self._mean_variance)
+
+
+def learnt(counts: Counts, rng: np.random.Generator) -> tuple[NDArray[np.float64], int]:
+    """Return particles (m, d + 1) of the hyperparameters, and how often their density was evaluated."""
+    samples = elliptical_slice_sample(
+        log_posterior,
+        counts,
+        counts.prior_mean,
+        np.diag(counts.prior_deviation),
+        rng,
+        keep=PARTICLES,
+        burn_in=SUCCESS_BURN_IN,
+        thin=THIN,
+    )
+    return samples.states, samples.evaluations
 
 
 def counted(
@@ -148,4 +153,5 @@ def counted(
         NUGGET,
         mean_variance,
         kernel,
+        np.empty((0, 2), dtype=np.int64),
     )

@@ -23,10 +23,10 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import Evidenc
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import Factors, GaussianProcessPosterior
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
-from surehold.optimization.surrogates.success.laplace import Counts, laplace, prior_covariance
+from surehold.optimization.surrogates.success.laplace import Counts, compared_covariance, laplace, prior_covariance
 from surehold.optimization.surrogates.success.propagation import Sites, propagated
 
-__all__ = ["SuccessPosterior", "probability", "shares", "sites_of"]
+__all__ = ["SuccessPosterior", "probability", "regression", "shares", "sites_of"]
 
 _STEP: Final = 1e-5  # of differences, in widths of the unit cube
 _LOG_SQRT_2PI: Final = 0.5 * np.log(2.0 * np.pi)
@@ -53,7 +53,7 @@ class SuccessPosterior:
         self._pending: Final = np.empty((0, d)) if pending is None else pending
         self.sites: Final = [sites_of(counts, one) for one in theta] if sites is None else sites
         inverse, alpha = np.stack([one.half for one in self.sites]), np.stack([one.alpha for one in self.sites])
-        self.latent: GaussianProcessPosterior = _regression(counts, theta, cost, Factors(inverse, alpha, 0))
+        self.latent: GaussianProcessPosterior = regression(counts, theta, cost, Factors(inverse, alpha, 0))
         if len(self._pending):
             self.latent = self._with(self._pending, cost)
         self.diagnostics: Final = FitDiagnostics(len(counts.X), cost, 0, False)
@@ -78,7 +78,7 @@ class SuccessPosterior:
             prior_covariance(self._theta[j], larger, K)
             B = np.eye(n) + root[j][:, None] * K * root[j]
             inverse[j] = solve_triangular(np.linalg.cholesky(B), np.diag(root[j]), lower=True)
-        return _regression(larger, self._theta, cost, Factors(inverse, alpha, 0))
+        return regression(larger, self._theta, cost, Factors(inverse, alpha, 0))
 
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of P at queries (q, d)."""
@@ -157,9 +157,11 @@ class SuccessPosterior:
 
 def sites_of(counts: Counts, theta: NDArray[np.float64]) -> Sites:
     """Return the sites under the hyperparameters theta (d + 1,), from Laplace's approximation on."""
-    n = len(counts.X)
-    K, L, a, W = np.empty((n, n)), np.empty((n, n)), np.empty(n), np.empty(n)
+    n, p = len(counts.X), len(counts.successes)
+    K, L, a, W = np.empty((n, n)), np.empty((p, p)), np.empty(p), np.empty(p)
     prior_covariance(theta, counts, K)
+    if len(counts.pairs):
+        K = compared_covariance(K, counts.pairs)
     laplace(K, counts.successes, counts.trials, a, W, L)
     return propagated(K, counts.successes, counts.trials, W, W * (K @ a) + a)
 
@@ -194,7 +196,7 @@ def _normals(s: int) -> NDArray[np.float64]:
     return ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12))
 
 
-def _regression(counts: Counts, theta: NDArray[np.float64], cost: int, factors: Factors) -> GaussianProcessPosterior:
+def regression(counts: Counts, theta: NDArray[np.float64], cost: int, factors: Factors) -> GaussianProcessPosterior:
     """Return the latent process as the regression that has these factors."""
     n = len(counts.X)
     evidence = Evidence(

@@ -1,0 +1,128 @@
+"""Preferences between two inputs as a surrogate: how good an input is, in units of the judgement's own noise.
+
+Legend
+    f       utility, a Gaussian process of mean 0; whoever compares a with b prefers a with the probability
+            Phi(g), g = (f_a - f_b) / sqrt 2: two utilities, each judged with a normal error of variance 1
+    A       (p, n): g = A f for p pairs of n inputs;  A K A' the covariance of g
+    H       half of the sites of g: (A K A' + 1 / tau)^-1 = H' H, see `propagation`
+
+Chu and Ghahramani 2005, with the probit code of successes: each pair is a success of g. Given the sites, f is again the
+posterior of a regression, whose precision is (H A)' (H A). Only differences of f mean something.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
+from surehold.optimization.surrogates.gaussian_process.posterior import Factors, GaussianProcessPosterior
+from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
+from surehold.optimization.surrogates.success.laplace import Counts
+from surehold.optimization.surrogates.success.model import counted, learnt
+from surehold.optimization.surrogates.success.posterior import regression, sites_of
+
+__all__ = ["PreferencePosterior", "PreferenceProcess"]
+
+
+class PreferencePosterior:
+    """The utility, conditioned on comparisons; a `Posterior` of f under particles `theta` (m, d + 1)."""
+
+    def __init__(self, counts: Counts, theta: NDArray[np.float64], cost: int):
+        n, p = len(counts.X), len(counts.pairs)
+        A = np.zeros((p, n))
+        A[np.arange(p), counts.pairs[:, 0]] = 0.5**0.5
+        A[np.arange(p), counts.pairs[:, 1]] -= 0.5**0.5
+        half, alpha = np.zeros((len(theta), n, n)), np.empty((len(theta), n))
+        for j, one in enumerate(theta):
+            sites = sites_of(counts, one)
+            triangle = np.linalg.qr(sites.half @ A, mode="r")  # of the same square, of n rows at most
+            half[j, : len(triangle)], alpha[j] = triangle, A.T @ sites.alpha
+        self._counts: Final = counts
+        self._theta: Final = theta
+        self.latent: Final[GaussianProcessPosterior] = regression(counts, theta, cost, Factors(half, alpha, 0))
+        self.diagnostics: Final = FitDiagnostics(n, cost, 0, False)
+        self.regions: Final = Regions.whole(counts.X.shape[1])
+
+    def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
+        """Return the moments of f at queries (q, d)."""
+        return self.latent.moments(queries, gradient)
+
+    def average(
+        self,
+        queries: NDArray[np.float64],
+        offsets: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        gradient: bool = False,
+        slopes: NDArray[np.float64] | None = None,
+    ) -> Moments:
+        """Return the moments of sum_i weights[i] f(query + offsets[i]) for queries (q, d)."""
+        return self.latent.average(queries, offsets, weights, gradient, slopes)
+
+    def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
+        return self.latent.sample(points, normals)
+
+    def preferred(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+        """Return the probability that one judgement prefers a (d,) to b (d,)."""
+        difference = self.latent.average(a[None], np.stack([np.zeros_like(a), b - a]), np.array([1.0, -1.0]))
+        return float(ndtr(difference.mean / np.sqrt(2.0 + difference.variance)).mean())
+
+    def thinned(self, count: int, first: int = 0) -> Posterior:
+        """Return the posterior of about `count` of the particles, evenly taken from number `first` on."""
+        return self.latent.thinned(count, first)
+
+    def with_pending(self, X: NDArray[np.float64]) -> "PreferencePosterior":
+        """Return the posterior as if each of X (k, d) had been compared with the best input, and had done as well.
+
+        Half a judgement won of one moves differences by little, and narrows them.
+        """
+        n, k = len(self._counts.X), len(X)
+        best = int(np.argmax(self.moments(self._counts.X).mean.mean(axis=0)))
+        pairs = np.column_stack([np.arange(n, n + k), np.full(k, best)])
+        more = self._counts._replace(
+            X=np.ascontiguousarray(np.concatenate([self._counts.X, X])),
+            successes=np.append(self._counts.successes, np.full(k, 0.5)),
+            trials=np.append(self._counts.trials, np.ones(k)),
+            pairs=np.concatenate([self._counts.pairs, pairs]),
+        )
+        return PreferencePosterior(more, self._theta, self.diagnostics.evaluations)
+
+    def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance (m, q) of the error with which a utility is judged at X (q, d): 1, which is its unit."""
+        return np.ones((len(self._theta), len(X)))
+
+
+class PreferenceProcess:
+    """A Gaussian process of utilities, learnt from which of two inputs was preferred; hyperparameters slice-sampled.
+
+    `kernel` as of `GaussianProcess`; `theta` (d + 1,) are fixed log length-scales and log signal variance; None
+    (default) learns them, with the priors of `SuccessProcess`.
+    """
+
+    def __init__(self, *, kernel: str = "matern52", theta: NDArray[np.float64] | None = None):
+        self._kernel: Final = kernel_number(kernel)
+        self._theta: Final = theta
+
+    @property
+    def noisy(self) -> bool:
+        """Observations carry noise: True."""
+        return True
+
+    def condition(
+        self, X: NDArray[np.float64], pairs: NDArray[np.intp], rng: np.random.Generator
+    ) -> PreferencePosterior:
+        """Learn from inputs X (n, d) in the unit cube and pairs (p, 2) of their rows, the preferred one first."""
+        low, high = pairs.min(axis=1), pairs.max(axis=1)
+        compared, which = np.unique(np.column_stack([low, high]), axis=0, return_inverse=True)
+        first = (pairs[:, 0] == low).astype(np.float64)
+        none = np.zeros(0)
+        counts = counted(X[:0], none, none, self._kernel, 0.0)._replace(
+            X=np.ascontiguousarray(X, dtype=np.float64),
+            successes=np.bincount(which.ravel(), first).astype(np.float64),
+            trials=np.bincount(which.ravel()).astype(np.float64),
+            pairs=compared.astype(np.int64),
+        )
+        theta, cost = learnt(counts, rng) if self._theta is None else (self._theta[None], 0)
+        return PreferencePosterior(counts, theta, cost)
