@@ -47,10 +47,11 @@ def success_surrogate(surrogate: Any) -> SuccessProcess | BetaProcess:
 
 
 def check_combination(settings: Mapping[str, Any]) -> None:
-    """Raise InputError for settings of `Optimizer`, other than their defaults, that success has no use for."""
+    """Raise InputError for settings of `Optimizer`, other than their defaults, that the outcome has no use for."""
+    preference = settings["outcome"] == "preference"
     defaults = {
         "direction": "maximize",
-        "criterion": None,
+        **({"surrogate": None, "failures": None} if preference else {"criterion": None}),
         "noise": None,
         "output_range": None,
         "risk": "mean",
@@ -63,8 +64,9 @@ def check_combination(settings: Mapping[str, Any]) -> None:
         given = settings.get(name, value)
         if not (given is value or (isinstance(given, (str, bool)) and given == value)):
             raise InputError(
-                f"{name}={given!r} cannot be combined with outcome='success', which maximizes the probability of "
-                f"success by a criterion of its own; leave {name} out."
+                f"{name}={given!r} cannot be combined with outcome={settings['outcome']!r}, "
+                + ("which has a model" if preference else "which maximizes the probability of success by a criterion")
+                + f" of its own; leave {name} out."
             )
 
 
@@ -76,6 +78,8 @@ def counted(
     Raises InputError where values and successes are mixed, or what was told is no outcome.
     """
     told = success is not None or successes is not None or of is not None
+    if outcome == "preference" and failed != "rig":
+        raise InputError("this optimizer is told preferences: tell_preference(better, worse).")
     if outcome != "success":
         if told:
             raise InputError(

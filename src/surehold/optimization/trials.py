@@ -56,6 +56,7 @@ class Trials:
         self._executions: list[int] = []
         self._deviations: list[float] = []
         self._counted: Final = counted
+        self._pairs: list[tuple[int, int]] = []
         self._commanded: list[NDArray[np.float64]] = []
         self._reached: list[NDArray[np.float64]] = []
         self._values: list[float] = []
@@ -100,6 +101,11 @@ class Trials:
     def deviations(self) -> NDArray[np.float64]:
         """Standard deviations of the observation noise that were told with the values, (t,); 0 where none was."""
         return np.array(self._deviations, dtype=np.float64)
+
+    @property
+    def pairs(self) -> NDArray[np.intp]:
+        """Rows of trials that were compared, (p, 2), the preferred one first."""
+        return np.array(self._pairs, dtype=np.intp).reshape(-1, 2)
 
     @property
     def numbers(self) -> NDArray[np.intp]:
@@ -207,6 +213,34 @@ class Trials:
         if number is not None:
             del self._pending[number]
 
+    def compare(self, better: Any, worse: Any) -> None:
+        """Record that an input was preferred to another one; see `Optimizer.tell_preference`.
+
+        The value of a trial is the share of its comparisons that it won. Nothing is recorded where one is bad.
+        """
+        places = [self._place_of(x) for x in (better, worse)]
+        if same(*places):
+            raise InputError(f"x = {self._box.as_dict(self._box.from_unit(places[0]))} is compared with itself.")
+        rows: list[int] = []
+        for x, u in zip((better, worse), places, strict=True):
+            known = np.flatnonzero(same(u, self.commanded))
+            if not len(known):
+                self.tell(x, 0.0, False, None)
+            rows.append(int(known[0]) if len(known) else len(self) - 1)
+        self._pairs.append((rows[0], rows[1]))
+        self._take_shares()
+
+    def _place_of(self, x: Any) -> NDArray[np.float64]:
+        """Return the place in the cube of x, which may have been told."""
+        if isinstance(x, AskedTrial) and x.number in self._numbers:
+            return self._commanded[self._numbers.index(x.number)]
+        return self._commanded_by(x)[1]
+
+    def _take_shares(self) -> None:
+        won, made = (np.bincount(rows.ravel(), minlength=len(self)) for rows in (self.pairs[:, 0], self.pairs))
+        self._values = np.where(made > 0, won / np.maximum(made, 1), np.nan).tolist()
+        self._executions = np.maximum(made, 1).tolist()
+
     def restore(
         self,
         X: ArrayLike,
@@ -217,12 +251,13 @@ class Trials:
         outputs: ArrayLike | None = None,
         executions: ArrayLike | None = None,
         deviations: ArrayLike | None = None,
+        pairs: ArrayLike = (),
     ) -> None:
         """Take over stored trials; see `Optimizer.restore`. Nothing is taken over where an argument is bad."""
         inputs = trial_inputs(self._box, "X", X, inside=True)
         waiting = trial_inputs(self._box, "pending", pending, inside=True)
         actual = trial_inputs(self._box, "reached", reached, inside=False)
-        self.restore_cube(inputs, y, actual, waiting, numbers, outputs, executions, deviations)
+        self.restore_cube(inputs, y, actual, waiting, numbers, outputs, executions, deviations, pairs)
 
     def restore_cube(
         self,
@@ -234,13 +269,17 @@ class Trials:
         outputs: ArrayLike | None = None,
         executions: ArrayLike | None = None,
         deviations: ArrayLike | None = None,
+        pairs: ArrayLike = (),
     ) -> None:
         """Take over trials whose inputs are points of the unit cube, as they are."""
         d = self._box.dimension
         inputs, actual, waiting = (
             np.asarray(points, dtype=np.float64).reshape(-1, d) for points in (commanded, reached, pending)
         )
-        values = np.asarray(y, dtype=np.float64)
+        compared = np.asarray(pairs, dtype=np.float64).reshape(-1, 2)
+        if not np.all(np.isin(compared, np.arange(len(inputs)))) or np.any(compared[:, 0] == compared[:, 1]):
+            raise InputError(f"preferences are {pairs!r}; give pairs of different rows of X, the better one first.")
+        values = np.zeros(len(inputs)) if len(compared) else np.asarray(y, dtype=np.float64)
         if values.shape != (len(inputs),) or len(actual) != len(inputs):
             raise InputError(
                 f"y has shape {values.shape} and reached {len(actual)} rows, but X has {len(inputs)} rows; give one "
@@ -273,6 +312,9 @@ class Trials:
         self._commanded, self._reached = list(inputs), list(actual)
         self._values, self._numbers = values.tolist(), given[: len(values)].tolist()
         self._pending = dict(zip(given[len(values) :].tolist(), waiting, strict=True))
+        self._pairs = [(int(better), int(worse)) for better, worse in compared]
+        if self._pairs:
+            self._take_shares()
 
     def equal(self, other: "Trials") -> bool:
         """Tell whether the same trials have been told, in the same order; pending ones do not matter."""
@@ -283,6 +325,7 @@ class Trials:
             and np.array_equal(self.outputs, other.outputs, equal_nan=True)
             and np.array_equal(self.executions, other.executions)
             and np.array_equal(self.deviations, other.deviations)
+            and np.array_equal(self.pairs, other.pairs)
         )
 
     def of_output(self, k: int) -> "Trials":

@@ -90,6 +90,8 @@ class Sampler(BaseSampler):
     ):
         if "direction" in settings:
             raise InputError("a sampler has no direction of its own; say optuna.create_study(direction=...).")
+        if settings.get("outcome") == "preference":
+            raise InputError("a study keeps no preferences; make a surehold.Optimizer, and tell_preference(...).")
         if search_space is None or isinstance(search_space, SearchSpace):
             self._space = search_space
         else:

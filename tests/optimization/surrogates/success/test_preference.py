@@ -1,4 +1,4 @@
-"""Preferences between two inputs, against sampling of the exact posterior and against a single comparison in closed form."""
+"""Preferences between two inputs, against sampling of the exact posterior and a single comparison in closed form."""
 
 import numpy as np
 import pytest
@@ -48,8 +48,10 @@ def test_differences_and_probabilities_are_those_of_exact_sampling():
             kept.append(f)
     kept = np.array(kept)
     posterior = PreferenceProcess(theta=THETA).condition(X, pairs, np.random.default_rng(0))
-    np.testing.assert_allclose(posterior.moments(both).mean[0], kept.mean(axis=0), atol=0.05)
-    np.testing.assert_allclose(np.sqrt(posterior.moments(both).variance[0]), kept.std(axis=0), atol=0.05)
+    over = kept - kept[:, np.argmin(np.abs(both - posterior.anchor).max(axis=1))][:, None]
+    assert over.mean(axis=0)[:8].max() == 0.0, "the anchor is the best of the inputs compared"
+    np.testing.assert_allclose(posterior.moments(both).mean[0], over.mean(axis=0), atol=0.05)
+    np.testing.assert_allclose(np.sqrt(posterior.moments(both).variance[0]), over.std(axis=0), atol=0.05)
     for a, b in ((8, 9), (10, 11), (0, 8)):
         exact = ndtr((kept[:, a] - kept[:, b]) / np.sqrt(2.0)).mean()
         assert posterior.preferred(both[a], both[b]) == pytest.approx(exact, abs=0.01)
@@ -63,11 +65,11 @@ def test_one_comparison_in_closed_form():
     worse, better = posterior.moments(X).mean[0]
     expected = v * 2.0 / np.sqrt(2.0 * np.pi) / np.sqrt(1.0 + v)
     assert (better - worse) / np.sqrt(2.0) == pytest.approx(expected, rel=1e-4)
-    assert better == pytest.approx(-worse)
+    assert better == pytest.approx(0.0, abs=1e-9)
 
 
 def test_preferred_is_antisymmetric_and_a_far_pair_is_even():
-    X, pairs = duels()
+    X, pairs = duels(20, 80)
     posterior = PreferenceProcess().condition(X, pairs, np.random.default_rng(0))
     a, b = np.array([0.5, 0.5]), np.array([0.05, 0.95])
     assert posterior.preferred(a, b) + posterior.preferred(b, a) == pytest.approx(1.0)
@@ -94,5 +96,5 @@ def test_a_pending_input_narrows_itself():
     posterior = PreferenceProcess(theta=THETA).condition(X, pairs, np.random.default_rng(0))
     at = np.array([[0.9, 0.1]])
     later = posterior.with_pending(at)
-    assert later.moments(at).variance[0, 0] < 0.9 * posterior.moments(at).variance[0, 0]
+    assert later.moments(at).variance[0, 0] < 0.95 * posterior.moments(at).variance[0, 0]
     assert later.noise_variance(at).shape == (1, 1)

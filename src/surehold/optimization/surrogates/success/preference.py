@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
 from surehold.optimization.surrogates.gaussian_process.posterior import Factors, GaussianProcessPosterior
-from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
+from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Regions
 from surehold.optimization.surrogates.success.laplace import Counts
 from surehold.optimization.surrogates.success.model import counted, learnt
 from surehold.optimization.surrogates.success.posterior import regression, sites_of
@@ -26,28 +26,36 @@ from surehold.optimization.surrogates.success.posterior import regression, sites
 __all__ = ["PreferencePosterior", "PreferenceProcess"]
 
 
-class PreferencePosterior:
-    """The utility, conditioned on comparisons; a `Posterior` of f under particles `theta` (m, d + 1)."""
+_BELIEVED: Final = 20.0  # judgements that a pending input counts as, so that others keep away from it
 
-    def __init__(self, counts: Counts, theta: NDArray[np.float64], cost: int):
-        n, p = len(counts.X), len(counts.pairs)
-        A = np.zeros((p, n))
-        A[np.arange(p), counts.pairs[:, 0]] = 0.5**0.5
-        A[np.arange(p), counts.pairs[:, 1]] -= 0.5**0.5
-        half, alpha = np.zeros((len(theta), n, n)), np.empty((len(theta), n))
-        for j, one in enumerate(theta):
-            sites = sites_of(counts, one)
-            triangle = np.linalg.qr(sites.half @ A, mode="r")  # of the same square, of n rows at most
-            half[j, : len(triangle)], alpha[j] = triangle, A.T @ sites.alpha
+
+class PreferencePosterior:
+    """The utility over that of the best input compared, the anchor: a `Posterior` of f(x) - f(anchor).
+
+    Without an anchor the common level of all utilities, of which comparisons say nothing, would count as a chance to
+    improve. `theta` (m, d + 1) are the particles, `latent` the posterior of f, computed where None.
+    """
+
+    def __init__(
+        self,
+        counts: Counts,
+        theta: NDArray[np.float64],
+        cost: int,
+        latent: GaussianProcessPosterior | None = None,
+        anchor: NDArray[np.float64] | None = None,
+    ):
         self._counts: Final = counts
         self._theta: Final = theta
-        self.latent: Final[GaussianProcessPosterior] = regression(counts, theta, cost, Factors(half, alpha, 0))
-        self.diagnostics: Final = FitDiagnostics(n, cost, 0, False)
+        self.latent: Final[GaussianProcessPosterior] = latent or _utility(counts, theta, cost)
+        if anchor is None:
+            anchor = counts.X[int(np.argmax(self.latent.moments(counts.X).mean.mean(axis=0)))]
+        self.anchor: Final[NDArray[np.float64]] = anchor
+        self.diagnostics: Final = FitDiagnostics(len(counts.X), cost, 0, False)
         self.regions: Final = Regions.whole(counts.X.shape[1])
 
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
-        """Return the moments of f at queries (q, d)."""
-        return self.latent.moments(queries, gradient)
+        """Return the moments of f(x) - f(anchor) at queries (q, d)."""
+        return self.average(queries, np.zeros((1, queries.shape[1])), np.ones(1), gradient)
 
     def average(
         self,
@@ -57,37 +65,47 @@ class PreferencePosterior:
         gradient: bool = False,
         slopes: NDArray[np.float64] | None = None,
     ) -> Moments:
-        """Return the moments of sum_i weights[i] f(query + offsets[i]) for queries (q, d)."""
-        return self.latent.average(queries, offsets, weights, gradient, slopes)
+        """Return the moments of sum_i weights[i] (f(query + offsets[i]) - f(anchor)) for queries (q, d)."""
+        shape = (len(queries), len(weights), queries.shape[1])
+        free = np.broadcast_to(1.0 if slopes is None else slopes, shape)
+        held = (self.anchor - queries)[:, None]
+        return self.latent.average(
+            queries,
+            np.concatenate([np.broadcast_to(offsets, shape), held], axis=1),
+            np.append(weights, -weights.sum()),
+            gradient,
+            np.concatenate([free, np.zeros_like(held)], axis=1),
+        )
 
     def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
-        return self.latent.sample(points, normals)
+        """Return joint draws (m, q, b, s) at points (q, s, d), made from independent standard normals (b, s)."""
+        anchored = np.concatenate([np.broadcast_to(self.anchor, (len(points), 1, points.shape[2])), points], axis=1)
+        first = np.random.default_rng(0).standard_normal((len(normals), 1))
+        draws = self.latent.sample(anchored, np.concatenate([first, normals], axis=1))
+        return draws[..., 1:] - draws[..., :1]
 
     def preferred(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
         """Return the probability that one judgement prefers a (d,) to b (d,)."""
         difference = self.latent.average(a[None], np.stack([np.zeros_like(a), b - a]), np.array([1.0, -1.0]))
         return float(ndtr(difference.mean / np.sqrt(2.0 + difference.variance)).mean())
 
-    def thinned(self, count: int, first: int = 0) -> Posterior:
+    def thinned(self, count: int, first: int = 0) -> "PreferencePosterior":
         """Return the posterior of about `count` of the particles, evenly taken from number `first` on."""
-        return self.latent.thinned(count, first)
+        latent = self.latent.thinned(count, first)
+        cost = self.diagnostics.evaluations
+        return PreferencePosterior(self._counts, latent.hyperparameters.theta, cost, latent, self.anchor)
 
     def with_pending(self, X: NDArray[np.float64]) -> "PreferencePosterior":
-        """Return the posterior as if each of X (k, d) had been compared with the best input, and had done as well.
-
-        Half a judgement won of one moves differences by little, and narrows them.
-        """
-        n, k = len(self._counts.X), len(X)
-        best = int(np.argmax(self.moments(self._counts.X).mean.mean(axis=0)))
-        pairs = np.column_stack([np.arange(n, n + k), np.full(k, best)])
+        """Return the posterior as if each of X (k, d) had been compared with the anchor, and had done as well."""
+        n, k = self._counts.X.shape[0], len(X)
+        anchor = int(np.argmin(np.abs(self._counts.X - self.anchor).max(axis=1)))
         more = self._counts._replace(
             X=np.ascontiguousarray(np.concatenate([self._counts.X, X])),
-            successes=np.append(self._counts.successes, np.full(k, 0.5)),
-            trials=np.append(self._counts.trials, np.ones(k)),
-            pairs=np.concatenate([self._counts.pairs, pairs]),
+            successes=np.append(self._counts.successes, np.full(k, 0.5 * _BELIEVED)),
+            trials=np.append(self._counts.trials, np.full(k, _BELIEVED)),
+            pairs=np.concatenate([self._counts.pairs, np.column_stack([np.arange(n, n + k), np.full(k, anchor)])]),
         )
-        return PreferencePosterior(more, self._theta, self.diagnostics.evaluations)
+        return PreferencePosterior(more, self._theta, self.diagnostics.evaluations, None, self.anchor)
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance (m, q) of the error with which a utility is judged at X (q, d): 1, which is its unit."""
@@ -126,3 +144,17 @@ class PreferenceProcess:
         )
         theta, cost = learnt(counts, rng) if self._theta is None else (self._theta[None], 0)
         return PreferencePosterior(counts, theta, cost)
+
+
+def _utility(counts: Counts, theta: NDArray[np.float64], cost: int) -> GaussianProcessPosterior:
+    """Return the posterior of f under the particles theta (m, d + 1)."""
+    n, p = len(counts.X), len(counts.pairs)
+    A = np.zeros((p, n))
+    A[np.arange(p), counts.pairs[:, 0]] = 0.5**0.5
+    A[np.arange(p), counts.pairs[:, 1]] = -(0.5**0.5)
+    half, alpha = np.zeros((len(theta), n, n)), np.empty((len(theta), n))
+    for j, one in enumerate(theta):
+        sites = sites_of(counts, one)
+        triangle = np.linalg.qr(sites.half @ A, mode="r")  # of the same square, of n rows at most
+        half[j, : len(triangle)], alpha[j] = triangle, A.T @ sites.alpha
+    return regression(counts, theta, cost, Factors(half, alpha, 0))
