@@ -1,6 +1,6 @@
 """What the optimizer believes of the response: its surrogate, conditioned on the trials told so far."""
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -117,7 +117,7 @@ class ResponseModel:
         return posterior
 
     def _conditioned(self, trials: Trials) -> Posterior:
-        model: object = self._surrogate
+        model: Any = self._surrogate
         if isinstance(model, (SuccessProcess, BetaProcess)):
             rng = np.random.default_rng([self._seed, 1, 0])
             return model.condition(trials.reached, trials.values, rng, trials=trials.executions.astype(np.float64))

@@ -47,11 +47,13 @@ class PreferencePosterior:
         self._counts: Final = counts
         self._theta: Final = theta
         self.latent: Final[GaussianProcessPosterior] = latent or _utility(counts, theta, cost)
-        if anchor is None:
-            anchor = counts.X[int(np.argmax(self.latent.moments(counts.X).mean.mean(axis=0)))]
-        self.anchor: Final[NDArray[np.float64]] = anchor
+        self.anchor: Final[NDArray[np.float64]] = self._best() if anchor is None else anchor
         self.diagnostics: Final = FitDiagnostics(len(counts.X), cost, 0, False)
         self.regions: Final = Regions.whole(counts.X.shape[1])
+
+    def _best(self) -> NDArray[np.float64]:
+        X = self._counts.X
+        return X[int(np.argmax(self.latent.moments(X).mean.mean(axis=0)))]
 
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of f(x) - f(anchor) at queries (q, d)."""
