@@ -13,12 +13,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.defaults import OUTLIER_DISTANCE, ROUNDED
+from surehold.defaults import ROUNDED
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit, checked_outputs
 from surehold.optimization.trial_inputs import trial_input, trial_inputs
-from surehold.optimization.values import number_of
+from surehold.optimization.values import checked_pairs, number_of, outliers_among, shares_won
 
 __all__ = ["AskedTrial", "Trials", "same"]
 
@@ -147,19 +147,9 @@ class Trials:
     def outliers(self) -> NDArray[np.bool_]:
         """Whether each value lies so far below the others that it is no measurement of the response, (t,).
 
-        Such as a reading of -30 among values from 0 to 1, or a penalty of -1000 for a crash: it, and all that is lower,
-        lies below the others by more than `OUTLIER_DISTANCE` times their whole range. A third of the values or more
-        are no outliers, and where the others are all equal nothing can be said.
+        See `values.outliers_among`; shares of successes have none.
         """
-        values = self.values
-        if self._counted:
-            return np.zeros(len(values), dtype=bool)
-        told = np.sort(values[self.successful])
-        n = len(told)
-        unit = told / max(float(np.abs(told).max()), 1e-300) if n else told  # differences of the largest overflow
-        gap, above = np.diff(unit), (unit[-1:] - unit)[1:]
-        apart = np.flatnonzero((gap > OUTLIER_DISTANCE * above) & (above > 0.0) & (3 * np.arange(1, n) < n))
-        return values < told[apart[-1] + 1] if len(apart) else np.zeros(len(values), dtype=bool)
+        return np.zeros(len(self), dtype=bool) if self._counted else outliers_among(self.values)
 
     @property
     def modelled(self) -> NDArray[np.float64]:
@@ -237,9 +227,8 @@ class Trials:
         return self._commanded_by(x)[1]
 
     def _take_shares(self) -> None:
-        won, made = (np.bincount(rows.ravel(), minlength=len(self)) for rows in (self.pairs[:, 0], self.pairs))
-        self._values = np.where(made > 0, won / np.maximum(made, 1), np.nan).tolist()
-        self._executions = np.maximum(made, 1).tolist()
+        shares, made = shares_won(self.pairs, len(self))
+        self._values, self._executions = shares.tolist(), made.tolist()
 
     def restore(
         self,
@@ -276,9 +265,7 @@ class Trials:
         inputs, actual, waiting = (
             np.asarray(points, dtype=np.float64).reshape(-1, d) for points in (commanded, reached, pending)
         )
-        compared = np.asarray(pairs, dtype=np.float64).reshape(-1, 2)
-        if not np.all(np.isin(compared, np.arange(len(inputs)))) or np.any(compared[:, 0] == compared[:, 1]):
-            raise InputError(f"preferences are {pairs!r}; give pairs of different rows of X, the better one first.")
+        compared = checked_pairs(pairs, len(inputs))
         values = np.zeros(len(inputs)) if len(compared) else np.asarray(y, dtype=np.float64)
         if values.shape != (len(inputs),) or len(actual) != len(inputs):
             raise InputError(
