@@ -292,8 +292,8 @@ FAILURE_SIGNALS: Final = (1.0, 10.0, 100.0, 1e3, 1e5)
 #: fails are worth their small chance again and again: on the edge of failure 41.6 evaluations to 1 %, with the second
 #: 21.8 (5 training seeds). python -m benchmarks.failures
 FAILURE_POWER: Final = 2.0
-#: Trials up to which failures are modelled where nothing is said: an ask takes 0.8 s at 200 and 6 s at 400, the third
-#: power of their number; beyond, a failed trial counts as the lowest value. Timed once; otherwise never measured.
+#: Trials up to which failures are modelled where nothing is said: the model takes 0.8 s at 200 and 3 s from 400 on
+#: (CPU, three variables); beyond, a failed trial counts as the lowest value. Timed once; otherwise never measured.
 FAILURES_MODELLED: Final = 200
 #: Under input noise a trial may become the answer where executions succeed with this share of the best probability
 #: among trials, if they do not with `FEASIBLE`: few failures leave the model unsure everywhere. Never measured.

@@ -8,6 +8,7 @@ from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.surrogates.success import model
 from surehold.optimization.surrogates.success.propagation import propagated
 
 RNG = np.random.default_rng(0)
@@ -68,6 +69,20 @@ def test_what_is_said_to_be_likely_is_so_at_least_as_often():
     assert true[low].mean() < p[low].mean() + 0.02
     assert true[high].mean() > p[high].mean() - 0.02
     assert true[~low & ~high].mean() == pytest.approx(0.5, abs=0.2)
+
+
+@pytest.mark.parametrize(("places", "times"), [(30, 6), (130, 1)])
+def test_repeated_and_many_trials_have_an_edge_as_single_ones(places, times, monkeypatch):
+    """Several trials at one place, told apart or put together, beside an edge as sharp as the model knows."""
+    monkeypatch.setattr(model, "SUCCESS_PLACES", 100)
+    rng = np.random.default_rng(0)
+    points = rng.random((places, 2))
+    points = points[np.abs(points @ [1.0, 0.4] - 0.8) > 0.05]
+    fine = points @ [1.0, 0.4] < 0.8
+    P, slopes = SuccessModel(np.repeat(points, times, axis=0), np.repeat(fine, times)).probability(points, True)
+    assert P[fine].min() > 0.8
+    assert P[~fine].max() < 0.2
+    assert np.isfinite(slopes).all()
 
 
 def run(n, seed, fails, **settings):
