@@ -37,7 +37,6 @@ RENEWED: Final = 16
 STALENESS: Final = 64
 #: Seconds after the last overlap of two asks for which proposals are still taken from the queue.
 CALM: Final = 10.0
-_PATIENCE: Final = 300.0  # seconds for one proposal; a child that takes longer hangs
 
 _log = logging.getLogger("surehold")
 
@@ -84,9 +83,11 @@ class Prepared:
         try:
             self._fill(trials, number, told)
             _, known, future = self._queue.popleft()
-            return future.result(_PATIENCE), told - known
-        except (BrokenProcessPool, SureholdError, TimeoutError, OSError) as error:
-            _log.warning(f"no proposals are prepared any more ({error or type(error).__name__}); each ask makes its own.")
+            return future.result(), told - known
+        except (BrokenProcessPool, SureholdError, OSError) as error:
+            _log.warning(
+                f"no proposals are prepared any more ({error or type(error).__name__}); each ask makes its own."
+            )
             self._possible = False
             self.close()
             return None
@@ -95,7 +96,7 @@ class Prepared:
         """End the child process."""
         self._empty()
         if self._child is not None:
-            self._child.shutdown(wait=False, cancel_futures=True)
+            self._child.shutdown(cancel_futures=True)
             self._child = None
 
     def _started(self) -> bool:

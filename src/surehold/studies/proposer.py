@@ -43,7 +43,8 @@ def take_up(history: History, direction: str, prepared: range) -> None:
 
 def propose(number: int) -> dict[str, Any]:
     """Return the parameters of the trial of this number; all trials asked for before are pending."""
-    assert _study is not None and _optimizer is not None
+    assert _study is not None
+    assert _optimizer is not None
     _made[number] = _study[0].space.complete(_optimizer.ask_trial(number=number).parameters)
     return _made[number]
 

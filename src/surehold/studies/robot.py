@@ -160,7 +160,9 @@ class RobotStudy:
 
     # --- asking ---------------------------------------------------------------------------------------------------
 
-    def ask(self, worker: str | None = None, *, lifetime: float | None = None, prepared: Proposals | None = None) -> Asked:
+    def ask(
+        self, worker: str | None = None, *, lifetime: float | None = None, prepared: Proposals | None = None
+    ) -> Asked:
         """Hand out a trial.
 
         Parameters
