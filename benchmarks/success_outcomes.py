@@ -1,10 +1,12 @@
 """Trials that only succeed or fail: the true probability of what is recommended, calibration, and the time of an ask.
 
-`python -m benchmarks.success_outcomes [--seeds 20] [--trials 40] [--problems rkhs,gm,nes-polynomial]`
+`python -m benchmarks.success_outcomes [--seeds 20] [--trials 40] [--problems rkhs,gm,nes-polynomial]
+[--methods success,beta,values,tpe,random]`
 
 A function of a shipped problem, standardized over its box, becomes a probability, p(x) = Phi(2.5 z(x)). Methods:
-success (`outcome="success"`), values (a Gaussian process with inferred noise told zeros and ones), tpe (Optuna's, which
-recommends its first success), random (random inputs, recommended by the success model).
+success (`outcome="success"`), beta (the same with `surrogate="beta_process"`), values (a Gaussian process with inferred
+noise told zeros and ones), tpe (Optuna's, which recommends its first success), random (random inputs, recommended by
+the success model).
 """
 
 import argparse
@@ -31,11 +33,12 @@ def probability_of(name):
 def surehold_run(method, box, p, seed, budgets):
     """Return the probability at the recommended input after each budget, and (predicted, happened) of each ask."""
     settings = {"outcome": "success"} if method != "values" else {"noise": "inferred"}
+    settings |= {"surrogate": "beta_process"} if method == "beta" else {}
     optimizer, rng, found, calibration = sh.Optimizer(box, seed=seed, **settings), np.random.default_rng(seed), [], []
     for t in range(budgets[-1]):
         x = box.from_unit(rng.random(box.dimension)) if method == "random" else optimizer.ask()
         happened = bool(rng.random() < p(x))
-        if method == "success" and t >= optimizer.n_initial:
+        if method in ("success", "beta") and t >= optimizer.n_initial:
             calibration.append((float(optimizer.predict(x[None])[0][0]), happened))
         if method == "values":
             optimizer.tell(x, float(happened))
@@ -62,23 +65,22 @@ def tpe_run(box, p, seed, budgets):
     return found
 
 
-def ask_seconds(n=100, d=3):
-    """Return seconds of one ask with n trials, learning included: success, and plain."""
+def ask_seconds(method, n, d=3):
+    """Return CPU seconds of one ask with n trials, learning included, of "success", "beta" or "plain" (of values)."""
     X = np.random.default_rng(0).random((n, d))
     box = sh.Box({f"x{i}": (0.0, 1.0) for i in range(d)})
     z = 1.0 - 4.0 * ((X - 0.5) ** 2).sum(axis=1)
-    happened = (np.random.default_rng(1).random(n) < ndtr(2.0 * z)).astype(float)
-    seconds = []
-    for settings, y in (({"outcome": "success"}, happened), ({}, z)):
-        taken = []
-        for seed in range(6):  # the first compiles
-            optimizer = sh.Optimizer(box, seed=seed, **settings)
-            optimizer.restore(X, y)
-            started = time.process_time()
-            optimizer.ask()
-            taken.append(time.process_time() - started)
-        seconds.append(np.median(taken[1:]))
-    return seconds
+    settings = {} if method == "plain" else {"outcome": "success"}
+    settings |= {"surrogate": "beta_process"} if method == "beta" else {}
+    y = z if method == "plain" else (np.random.default_rng(1).random(n) < ndtr(2.0 * z)).astype(float)
+    taken = []
+    for seed in range(6 if n <= 100 else 3):  # the first compiles
+        optimizer = sh.Optimizer(box, seed=seed, **settings)
+        optimizer.restore(X, y)
+        started = time.process_time()
+        optimizer.ask()
+        taken.append(time.process_time() - started)
+    return np.median(taken[1:])
 
 
 def main():
@@ -87,25 +89,26 @@ def main():
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--trials", type=int, default=40)
     parser.add_argument("--no-time", action="store_true", help="leave the time of an ask out")
+    parser.add_argument("--sizes", default="100", help="numbers of trials of which the time of an ask is measured")
+    parser.add_argument("--methods", default="success,beta,values,tpe,random")
     parser.add_argument("--problems", default="rkhs,gm,nes-polynomial")
     arguments = parser.parse_args()
-    success, plain = (np.nan, np.nan) if arguments.no_time else ask_seconds()
-    print(
-        f"ask at n = 100, d = 3: success {success:.3f} s CPU, plain {plain:.3f} s, ratio {success / plain:.1f}",
-        flush=True,
-    )
+    methods = arguments.methods.split(",")
+    for n in () if arguments.no_time else map(int, arguments.sizes.split(",")):
+        for method in [m for m in (*methods, "plain") if m in ("success", "beta", "plain")]:
+            print(f"ask at n = {n}, d = 3: {method} {ask_seconds(method, n):.3f} s CPU", flush=True)
     budgets = tuple(b for b in BUDGETS if b <= arguments.trials)
-    pairs = []
-    for name in arguments.problems.split(","):
+    pairs = {}
+    for name in filter(None, arguments.problems.split(",")):
         box, p = probability_of(name)
         results = {}
         for seed in range(arguments.seeds):
-            for method in ("success", "values", "tpe", "random"):
+            for method in methods:
                 if method == "tpe":
                     found = tpe_run(box, p, seed, budgets)
                 else:
                     found, calibration = surehold_run(method, box, p, seed, budgets)
-                    pairs += calibration
+                    pairs.setdefault(method, []).extend(calibration)
                 results.setdefault(method, []).append(found)
                 print(f"{name} seed {seed} {method}: {np.round(found, 4).tolist()}", flush=True)
         for method, found in results.items():
@@ -113,11 +116,13 @@ def main():
             error = table.std(axis=0, ddof=1) / np.sqrt(len(table))
             cells = "  ".join(f"{m:.3f} +- {e:.3f}" for m, e in zip(table.mean(axis=0), error, strict=True))
             print(f"{name:16s} {method:8s} after {budgets}: {cells}  ({len(table)} seeds)", flush=True)
-    predicted, happened = np.array(pairs).T
-    for k in range(10):
-        inside = (predicted >= k / 10) & (predicted < (k + 1) / 10)
-        if inside.sum() > 1:
-            print(f"predicted {predicted[inside].mean():.3f}: happened {happened[inside].mean():.3f} of {inside.sum()}")
+    for method, told in pairs.items():
+        predicted, happened = np.array(told).reshape(-1, 2).T
+        for k in range(10):
+            inside = (predicted >= k / 10) & (predicted < (k + 1) / 10)
+            if inside.sum() > 1:
+                means = f"predicted {predicted[inside].mean():.3f}: happened {happened[inside].mean():.3f}"
+                print(f"{method:8s} {means} of {inside.sum()}")
 
 
 if __name__ == "__main__":

@@ -306,6 +306,9 @@ SUCCESS_SHARE: Final = 0.9
 #: clearer. Never measured against others.
 SUCCESS_SIGNAL_PRIOR: Final = (0.7, 0.7)
 SUCCESS_MEAN_VARIANCE: Final = 1.0
+#: Successes and failures that the beta process counts before any trial: the uniform distribution. Never measured
+#: against others.
+BETA_PRIOR: Final = (1.0, 1.0)
 #: States of the slice sampler that are dropped first: it starts at the prior, not at a mode. Never measured.
 SUCCESS_BURN_IN: Final = 20
 #: Joint draws by which the spread of a share of successes under the input noise is known. Never measured.

@@ -51,7 +51,7 @@ def test_a_robot_by_commands(study, here):
         assert asked["units"] == {"dx": "m", "dy": "m"}
         x = asked["parameters"]
         told = study(f"tell mug {k} {1.0 - 40.0 * abs(x['dx'] - 0.01) - 20.0 * abs(x['dy'])!r}")
-        assert told == {"id": k, "state": "complete", "value": told["value"], "already": False}
+        assert told == {"id": k, "state": "complete", "value": told["value"], "already": False, "of": 1}
         assert study(f"tell mug {k} {told['value']!r}")["already"]
     assert "told before" in study("tell mug 0 7", code=2)
     failed = study("ask mug --worker arm")
@@ -372,3 +372,20 @@ def test_choices_need_no_quotes(capsys):
     assert json.loads(capsys.readouterr().out)["parameters"]["grip"]["attributes"]["choices"] == ["pinch", "power"]
     assert run(["study", "create", "old", "--parameters", "grip=a/b|c", "--noise", "none", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["parameters"]["grip"]["attributes"]["choices"] == ["a/b", "c"]
+
+
+def test_counts_of_successes(study, capsys):
+    study("create rig --parameters x=0:1 --outcome success")
+    study("ask rig")
+    for wrong, why in (("8/7", "8 of 7"), ("-1/3", "successes is -1"), ("x/3", "'x/3' is no count"), ("0.7", "7/10")):
+        assert why in study(f"tell rig 0 {wrong}", code=2)
+    told = study("tell rig 0 7/10")
+    assert told == {"id": 0, "state": "complete", "value": 0.7, "already": False, "of": 10}
+    study("add rig 3/4 --at x=0.5")
+    assert run(["study", "tell", "rig", "0", "7/10"]) == 0
+    assert "trial 0: value 0.7 of 10 executions, as told before" in capsys.readouterr().out
+    assert run(["study", "export", "rig"]) == 0
+    header, first, second = capsys.readouterr().out.splitlines()
+    assert header.startswith("id,state,value,of,x,")
+    assert first.startswith("0,complete,0.7,10,")
+    assert second.startswith("1,complete,0.75,4,0.5,")

@@ -6,8 +6,10 @@ from scipy import integrate, stats
 from scipy.special import ndtr
 
 import surehold as sh
+from surehold.defaults import CONTENDERS
 from surehold.errors import InputError
 from surehold.optimization.acquisition.probability_improvement import ProbabilityImprovement, improvement
+from surehold.optimization.surrogates.success.beta_process import BetaPosterior
 from surehold.optimization.surrogates.success.model import SuccessProcess
 
 BOX = sh.Box({"x": (0.0, 1.0)})
@@ -174,3 +176,76 @@ def test_maximize_refuses_values_and_gives_up_where_all_trials_raise():
 
     with pytest.raises(sh.SureholdError, match="no rig"):
         sh.maximize(broken, BOX, 10, outcome="success")
+
+
+# --- by counts near by ------------------------------------------------------------------------------------------------
+
+
+def test_the_beta_process_finds_where_trials_succeed():
+    for seed in range(3):
+        optimizer = run(60, seed, surrogate="beta_process")
+        assert isinstance(optimizer.posterior, BetaPosterior)
+        assert probability(optimizer.recommend().x) > 0.9
+        mean, std = optimizer.predict([[0.1], [0.7]])
+        assert mean[1] > mean[0] + 0.3
+        assert np.all((std > 0.0) & (std < 0.3))
+
+
+def test_the_beta_process_refuses_a_narrow_place_under_noise():
+    optimizer = sh.Optimizer(
+        BOX, outcome="success", surrogate="beta_process", input_noise=sh.InputNoise.unit(0.06), seed=1
+    )
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        x = optimizer.ask()
+        p = 0.98 if abs(x[0] - 0.2) < 0.03 else 0.9 * np.exp(-0.5 * ((x[0] - 0.7) / 0.15) ** 2)
+        optimizer.tell(x, successes=int(rng.binomial(10, p)), of=10)
+    best = optimizer.recommend()
+    assert abs(best.x[0] - 0.7) < 0.12
+    assert 0.0 <= best.probability_of_share(0.9) <= best.probability_of_share(0.5) <= 1.0
+    assert best.quantile <= best.mean <= 1.0
+
+
+def test_the_beta_process_saved_and_restored_asks_the_same(tmp_path):
+    optimizer = run(12, surrogate="beta_process")
+    optimizer.tell([0.65], successes=7, of=10)
+    optimizer.save(tmp_path / "run.json")
+    again = sh.Optimizer.load(tmp_path / "run.json")
+    assert again.ask() == pytest.approx(optimizer.ask(), abs=1e-9)
+    assert len(np.unique(optimizer.ask(3).round(6))) == 3
+
+
+def test_the_beta_process_takes_whole_numbers():
+    box = sh.Box({"x": (0.0, 1.0), "n": (1, 5, "int")})
+    optimizer = sh.Optimizer(box, outcome="success", surrogate="beta_process", seed=0)
+    rng = np.random.default_rng(0)
+    X = np.column_stack([rng.random(301), rng.integers(1, 6, 301)])  # after the 300th a hole would be filled
+    p = 0.9 * np.exp(-0.5 * ((X[:, 0] - 0.6) / 0.1) ** 2) * (X[:, 1] == 3)
+    optimizer.restore(X, (rng.random(301) < p).astype(float))
+    asked, best = optimizer.ask_trial().parameters, optimizer.recommend()
+    assert asked["n"] == 3
+    assert best.x[1] == 3
+    assert abs(best.x[0] - 0.6) < 0.1
+
+
+def test_of_many_successes_the_early_ones_are_not_all_that_is_looked_at():
+    rng = np.random.default_rng(0)
+    x = np.concatenate([rng.uniform(0.0, 0.5, 900), rng.uniform(0.5, 1.0, 500)])  # more early successes than contenders
+    optimizer = sh.Optimizer(BOX, outcome="success", surrogate="beta_process", seed=0)
+    optimizer.restore(x[:, None], (rng.random(1400) < np.where(x < 0.5, 0.5, 0.95)).astype(float))
+    assert optimizer.y[:900].sum() > CONTENDERS
+    assert optimizer.recommend().x[0] > 0.55
+    assert optimizer.ask()[0] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"surrogate": "beta_process"}, "counts successes; say outcome='success'"),
+        ({"surrogate": "beta", "outcome": "success"}, "surrogate='beta' cannot be combined .*'beta_process'"),
+        ({"surrogate": sh.GaussianProcess(), "outcome": "success"}, "cannot be combined with outcome='success'"),
+    ],
+)
+def test_surrogates_that_do_not_fit_the_outcome_are_refused(settings, message):
+    with pytest.raises(InputError, match=message):
+        sh.Optimizer(BOX, **settings)

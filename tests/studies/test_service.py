@@ -9,12 +9,14 @@ from types import SimpleNamespace
 
 import httpx
 import pytest
+from fastapi.testclient import TestClient
 from optuna.trial import TrialState
 
 import surehold as sh
 from surehold.errors import InputError
 from surehold.studies.robot import RobotStudy
 from surehold.studies.search_space import SearchSpace
+from surehold.studies.service import service
 from surehold.studies.service_guard import Impatience
 from surehold.studies.settings import StudySettings
 from surehold.studies.stop_rule import StopRule
@@ -62,7 +64,7 @@ def test_ask_and_tell(client, study):
     assert stored.params == asked["parameters"]
     answer = {"id": asked["id"], "value": 0.5, "reached": {"dx": 0.001}}
     assert client.post("/tell", json=answer).json() == {
-        "id": asked["id"], "state": "complete", "value": 0.5, "already": False,
+        "id": asked["id"], "state": "complete", "value": 0.5, "already": False, "of": 1,
     }  # fmt: skip
     assert study.trials()[asked["id"]].value == 0.5
     assert client.post("/tell", json=answer).json()["already"]
@@ -96,6 +98,22 @@ def test_people_in_the_loop(client, study):
     study.set_stop_rule(StopRule())
 
 
+def test_counts_of_successes(tmp_path):
+    settings = StudySettings(SETTINGS.space, None, {}, {"seed": 0, "outcome": "success"})
+    held = RobotStudy.create("held", settings, str(tmp_path / "journal.log"))
+    client = TestClient(service(held, TOKEN), "http://127.0.0.1", headers={"Authorization": f"Bearer {TOKEN}"})
+    id = client.post("/studies/held/ask", json={}).json()["id"]
+    for wrong in ({"successes": 8, "of": 7}, {"successes": 1}, {"successes": 1, "of": 2, "value": "success"}):
+        refused = client.post("/studies/held/tell", json={"id": id} | wrong)
+        assert refused.status_code == 422
+        assert "successes" in refused.json()["detail"]
+    taken = client.post("/studies/held/tell", json={"id": id, "successes": 7.0, "of": 10}).json()
+    assert taken == {"id": id, "state": "complete", "value": 0.7, "already": False, "of": 10}
+    at = {"parameters": {"dx": 0.0, "dy": 0.0}, "successes": 2, "of": 4}
+    client.post("/studies/held/add", json=at)
+    assert [(t["value"], t["of"]) for t in client.get("/studies/held/trials").json()] == [(0.7, 10), (0.5, 4)]
+
+
 BAD_BODIES = [
     b"", b"{", b"[]", b"null", b'"text"', b"\xff\xfe", b"[" * 30_000, b'{"id": 0, "value": NaN}',
     b'{"id": 0, "value": Infinity}', b'{"id": 0, "value": 1e999}', b'{"id": 0, "value": "0.5"}',
@@ -104,6 +122,7 @@ BAD_BODIES = [
     b'{"id": 99999999999999999999999, "value": 1}', b'{"value": 1}', b'{"id": 0, "value": 1, "extra": 1}',
     b'{"id": 0, "value": 1, "reached": {"dx": 1e300}}', b'{"id": 0, "value": 1, "reached": {"dz": 0}}',
     b'{"id": 0, "value": 1, "reached": {"dx": NaN}}', b'{"id": 0, "value": 1, "reached": [1, 2]}',
+    b'{"id": 0, "successes": 1, "of": 2}', b'{"id": 0, "successes": 1.5, "of": 2}', b'{"id": 0, "of": true}',
 ]  # fmt: skip
 
 

@@ -74,7 +74,9 @@ def create(
     feasible: Annotated[
         float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
     ] = 0.0,
-    outcome: Annotated[str, typer.Option(help="Of a trial: value, or success (tell success or failure).")] = "value",
+    outcome: Annotated[
+        str, typer.Option(help="Of a trial: value, or success (tell success, failure or 7/10).")
+    ] = "value",
     storage: Storage = "",
     as_json: Json = False,
 ) -> None:
@@ -136,7 +138,7 @@ def tell(
     id: Annotated[int, typer.Argument(help="Of the trial, as ask printed it.")],
     value: Annotated[
         str | None,
-        typer.Argument(help="Outcome: a number, or success or failure.", show_default=False),
+        typer.Argument(help="Outcome: a number; or success, failure, or 7/10.", show_default=False),
     ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="The trial gave nothing.")] = False,
     reached: Annotated[
@@ -168,7 +170,8 @@ def tell(
     study = opened(name, storage)
     told = study.tell(id, value, failed=failed, reached=places, constraints=outputs, contacts=touched)
     outcome = "failed" if told.value is None else f"value {told.value!r}"
-    found = {"id": told.id, "state": told.state, "value": told.value, "already": told.already}
+    outcome += f" of {told.of} executions" * (told.of > 1)
+    found = {"id": told.id, "state": told.state, "value": told.value, "already": told.already, "of": told.of}
     say(found, f"trial {told.id}: {outcome}{', as told before' * told.already}", as_json)
 
 

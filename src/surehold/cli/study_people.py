@@ -50,7 +50,9 @@ def veto(name: Name, id: Id, reason: Reason = "", storage: Storage = "", as_json
 def add(
     name: Name,
     at: Annotated[str, typer.Option(help="Where the trial was made: NAME=VALUE,... for every parameter.")],
-    value: Annotated[str | None, typer.Argument(help="Outcome, larger is better.", show_default=False)] = None,
+    value: Annotated[
+        str | None, typer.Argument(help="Outcome: a number; or success, failure, or 7/10.", show_default=False)
+    ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="The trial gave nothing.")] = False,
     constraints: Outputs = "",
     storage: Storage = "",

@@ -30,10 +30,10 @@ from surehold.optimization.strategy.named import strategy_named
 from surehold.optimization.strategy.protocol import Strategy
 from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.strategy.trust_region import TrustRegion
-from surehold.optimization.success import check_combination
+from surehold.optimization.success import BETA_PROCESS, check_combination, success_surrogate
 from surehold.optimization.surrogates.named import TELLABLE
 from surehold.optimization.surrogates.protocol import NoisySurrogate
-from surehold.optimization.surrogates.success.model import SuccessProcess
+from surehold.optimization.surrogates.success.beta_process import BetaProcess
 from surehold.optimization.trial_inputs import initial_inputs
 
 __all__ = ["Parts", "assembled", "default_n_initial", "whole_number"]
@@ -86,6 +86,8 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     _check(s)
     if s.outcome == "success":
         check_combination(settings)
+    elif isinstance(s.surrogate, str) and s.surrogate == BETA_PROCESS:
+        raise InputError(f"surrogate='{BETA_PROCESS}' counts successes; say outcome='success' beside it.")
     seed = whole_number("seed", s.seed, 0)
     input_noise = noise_of_coordinates(s.input_noise, box)
     straying = input_noise if s.noise_while_exploring else None
@@ -96,7 +98,7 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     told = s.noise == "told"
     thesis = None if s.preset is None else thesis_preset(s.preset)
     surrogate = chosen_surrogate(
-        SuccessProcess() if s.outcome == "success" else s.surrogate,
+        success_surrogate(s.surrogate) if s.outcome == "success" else s.surrogate,
         preset=s.preset,
         thesis=thesis,
         noise=None if told else s.noise,
@@ -123,6 +125,7 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
         thesis=thesis,
         allowed=None if region is None else region.contains,
         outcome=s.outcome,
+        counted=isinstance(surrogate, BetaProcess),
     )
     takes_noise = isinstance(surrogate, NoisySurrogate)
     if s.noise_while_exploring and (input_noise is None or thesis is not None or not takes_noise):

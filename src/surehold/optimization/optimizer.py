@@ -145,7 +145,8 @@ class Optimizer(Record):
         "value" (default): a trial gives a number. "success": it succeeds or fails, `tell(x, success=True)`, or does so
         several times, `tell(x, successes=7, of=10)`. What is maximized is then the probability to succeed, under the
         input noise; `y` and `predict` are shares and probabilities, and `Recommendation.probability_of_share` answers
-        how sure it is that nine of ten executions succeed. Model and criterion are its own (Tesch et al. 2013).
+        how sure it is that nine of ten executions succeed. Model and criterion are its own (Tesch et al. 2013);
+        `surrogate="beta_process"` counts near by instead, for many trials (Montesano and Lopes 2012).
 
     Raises
     ------

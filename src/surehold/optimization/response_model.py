@@ -15,6 +15,7 @@ from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.surrogates.named import DEFAULT_SURROGATE, refuse_settings, surrogate_named
 from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate
+from surehold.optimization.surrogates.success.beta_process import BetaProcess
 from surehold.optimization.surrogates.success.model import SuccessProcess
 from surehold.optimization.trials import Trials
 from surehold.store import background
@@ -116,7 +117,7 @@ class ResponseModel:
 
     def _conditioned(self, trials: Trials) -> Posterior:
         model: object = self._surrogate
-        if isinstance(model, SuccessProcess):
+        if isinstance(model, (SuccessProcess, BetaProcess)):
             rng = np.random.default_rng([self._seed, 1, 0])
             return model.condition(trials.reached, trials.values, rng, trials=trials.executions.astype(np.float64))
         values = trials.modelled if self._screened else trials.values

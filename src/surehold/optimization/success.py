@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +11,35 @@ from surehold.errors import InputError
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.recommendation import Outcome, Recommendation
 from surehold.optimization.surrogates.protocol import Posterior
+from surehold.optimization.surrogates.success.beta_process import BetaProcess
+from surehold.optimization.surrogates.success.model import SuccessProcess
 
-__all__ = ["check_combination", "counted", "described"]
+__all__ = ["BETA_PROCESS", "MOST_EXECUTIONS", "check_combination", "counted", "described", "success_surrogate"]
+
+#: Name of the surrogate that counts successes near by.
+BETA_PROCESS: Final = "beta_process"
+#: Executions of one trial; more tell nothing more, and could not be counted exactly in their share.
+MOST_EXECUTIONS: Final = 1_000_000
+
+
+def success_surrogate(surrogate: Any) -> SuccessProcess | BetaProcess:
+    """Return the surrogate of successes that a setting stands for; raises InputError where it is none."""
+    if surrogate is None:
+        return SuccessProcess()
+    if isinstance(surrogate, (SuccessProcess, BetaProcess)):
+        return surrogate
+    if surrogate == BETA_PROCESS:
+        return BetaProcess()
+    raise InputError(
+        f"surrogate={surrogate!r} cannot be combined with outcome='success', whose model is of probabilities; leave it "
+        f"out for a Gaussian process behind a probit likelihood, or say '{BETA_PROCESS}' for counts near by."
+    )
 
 
 def check_combination(settings: Mapping[str, Any]) -> None:
     """Raise InputError for settings of `Optimizer`, other than their defaults, that success has no use for."""
     defaults = {
         "direction": "maximize",
-        "surrogate": None,
         "criterion": None,
         "noise": None,
         "output_range": None,
@@ -73,6 +93,8 @@ def counted(
     for name, value, least in (("of", of, 1), ("successes", successes, 0)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
             raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
+    if of > MOST_EXECUTIONS:
+        raise InputError(f"of is {of!r}; give at most {MOST_EXECUTIONS} executions a trial.")
     if successes > of:
         raise InputError(f"successes are {successes} of {of}; there cannot be more than executions.")
     return successes / of, int(of), False

@@ -17,14 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 from optuna.trial import FrozenTrial, TrialState
 
+from surehold.optimization.success import MOST_EXECUTIONS
 from surehold.studies.search_space import SearchSpace
 
-__all__ = ["CONTACTS", "OUTPUTS", "REACHED", "History", "history_of", "parameters_of"]
+__all__ = ["CONTACTS", "EXECUTIONS", "OUTPUTS", "REACHED", "History", "history_of", "parameters_of"]
 
 #: Trial attribute that holds the parameters that were truly reached.
 REACHED: Final = "surehold:reached"
 #: Trial attribute that holds the further outputs; an attribute of an output's own name does, too.
 OUTPUTS: Final = "surehold:outputs"
+#: Trial attribute that holds of how many executions the value is the share that succeeded; 1 where it is missing.
+EXECUTIONS: Final = "surehold:executions"
 #: Trial attribute that holds what a hand touched, as problems/grasp/told_contacts.py describes it.
 CONTACTS: Final = "surehold:contacts"
 
@@ -44,6 +47,8 @@ class History(NamedTuple):
     """numbers of the told trials (t,)"""
     outputs: NDArray[np.float64]
     """further outputs (t, o); NaN where one was not measured"""
+    executions: NDArray[np.intp]
+    """executions (t,) of which the value is the share that succeeded, 1 or more"""
 
 
 def history_of(
@@ -62,6 +67,7 @@ def history_of(
     values: list[float] = []
     numbers: list[int] = []
     measured: list[list[float]] = []
+    executions: list[int] = []
     ordered = sorted(trials, key=lambda trial: trial.number)
     retried = {k for trial in ordered for k in trial.system_attrs.get("retry_history", ())}
     for trial in ordered:
@@ -80,6 +86,8 @@ def history_of(
         values.append(value if np.isfinite(value) else np.nan)
         numbers.append(trial.number)
         attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
+        of = trial.user_attrs.get(EXECUTIONS, 1)
+        executions.append(of if type(of) is int and 0 < of <= MOST_EXECUTIONS and np.isfinite(value) else 1)
         measured.append([_finite(attributes.get(name)) for name in outputs])
     return History(
         space.encode_all(told),
@@ -88,6 +96,7 @@ def history_of(
         space.encode_all(pending),
         np.array(numbers, dtype=np.intp),
         np.array(measured, dtype=np.float64).reshape(len(numbers), len(outputs)),
+        np.array(executions, dtype=np.intp),
     )
 
 

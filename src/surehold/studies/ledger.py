@@ -12,7 +12,7 @@ from optuna.storages import BaseStorage
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from surehold.errors import InputError
-from surehold.studies.history import CONTACTS, OUTPUTS, REACHED
+from surehold.studies.history import CONTACTS, EXECUTIONS, OUTPUTS, REACHED
 from surehold.studies.search_space import SearchSpace
 
 __all__ = [
@@ -71,6 +71,8 @@ class Told:
     value: float | None
     already: bool
     """whether the same answer had been given before"""
+    of: int = 1
+    """executions of which the value is the share that succeeded"""
 
 
 class Ledger:
@@ -148,6 +150,7 @@ class Ledger:
         reached: Mapping[str, Any] | None,
         outputs: Mapping[str, float] | None = None,
         contacts: Mapping[str, Any] | None = None,
+        executions: int = 1,
     ) -> Told:
         """Store an answer; see `RobotStudy.tell`."""
         number = checked_value(value, failed)
@@ -164,11 +167,13 @@ class Ledger:
                     self._backend.set_trial_user_attr(trial._trial_id, OUTPUTS, dict(outputs or {}))
                 if contacts is not None or CONTACTS in trial.user_attrs:
                     self._backend.set_trial_user_attr(trial._trial_id, CONTACTS, contacts)
+                if executions != 1 or EXECUTIONS in trial.user_attrs:
+                    self._backend.set_trial_user_attr(trial._trial_id, EXECUTIONS, executions)
                 if number is None:
                     self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
                 else:
                     self._backend.set_trial_state_values(trial._trial_id, TrialState.COMPLETE, [number])
-                return Told(id, state, number, False)
+                return Told(id, state, number, False, executions)
             except UpdateFinishedTrialError:  # somebody else was quicker
                 trial = self.trial(id)
         before = answer_of(trial)
@@ -176,14 +181,17 @@ class Ledger:
         elsewhere = actual is not None and actual != trial.user_attrs.get(REACHED, trial.params)
         otherwise = bool(outputs) and outputs != trial.user_attrs.get(OUTPUTS, {})
         touched = contacts is not None and contacts != trial.user_attrs.get(CONTACTS)
-        if before != now or elsewhere or otherwise or touched:
+        of = trial.user_attrs.get(EXECUTIONS, 1)
+        if before != now or elsewhere or otherwise or touched or of != executions:
             differing = ", reached elsewhere" * elsewhere + ", with other outputs" * otherwise
-            differing += ", with other contacts" * touched
+            differing += ", with other contacts" * touched + f", of {executions} executions, not {of}" * (
+                of != executions
+            )
             raise AnswerRefused(
                 f"trial {id} was told before: {before}; now: {now}{differing}. The first "
                 "answer counts; add the other one as a trial of its own if it was made."
             )
-        return Told(id, state, number, True)
+        return Told(id, state, number, True, executions)
 
     def veto(self, id: int, reason: str) -> None:
         """Store that a trial must not be made; see `RobotStudy.veto`."""

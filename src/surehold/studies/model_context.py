@@ -52,10 +52,18 @@ def model_context_server(study: RobotStudy) -> MCPServer:
 
     @server.tool()
     def tell(
-        id: int, value: float | None = None, failed: bool = False, reached: dict[str, Any] | None = None
+        id: int,
+        value: float | None = None,
+        failed: bool = False,
+        reached: dict[str, Any] | None = None,
+        successes: int | None = None,
+        of: int | None = None,
     ) -> dict[str, Any]:
-        """Say what came of a trial: its value, or that it failed; `reached` are the parameters truly reached."""
-        told = answered(study.tell, id, value, failed=failed, reached=reached)
+        """Say what came of a trial: its value, or that it failed; `reached` are the parameters truly reached.
+
+        Where the study is about success: successes of so many executions, in place of the value.
+        """
+        told = answered(study.tell, id, value, failed=failed, reached=reached, successes=successes, of=of)
         return {"id": told.id, "state": told.state, "value": told.value, "already": told.already}
 
     @server.tool()

@@ -35,7 +35,11 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
     recommendations: dict[int, Recommendation] = {}
     for count in sorted(replayed):
         optimizer.restore(
-            history.X[:count], history.y[:count], reached=history.reached[:count], outputs=history.outputs[:count]
+            history.X[:count],
+            history.y[:count],
+            reached=history.reached[:count],
+            outputs=history.outputs[:count],
+            of=history.executions[:count],
         )
         recommendations[count] = optimizer.recommend()
     sign = 1.0 if study.settings.direction == "maximize" else -1.0

@@ -18,7 +18,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.limits import checked_outputs, limits_of
-from surehold.studies.history import OUTPUTS, REACHED, history_of, parameters_of
+from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, history_of, parameters_of
 from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
 from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend, written
 from surehold.studies.settings import SETTINGS, StudySettings
@@ -241,6 +241,8 @@ class RobotStudy:
         reached: Mapping[str, Any] | None = None,
         constraints: Mapping[str, Any] | None = None,
         contacts: Mapping[str, Any] | None = None,
+        successes: int | None = None,
+        of: int | None = None,
     ) -> Told:
         """Take the answer to a trial: its value, or that it gave nothing.
 
@@ -249,7 +251,7 @@ class RobotStudy:
         id
             Of the trial, as `ask` gave it.
         value
-            Finite; larger is better. Of a study about success: "success" or "failure", or True or False.
+            Finite; larger is better. Of a study about success: "success" or "failure", True or False, or "7/10".
         failed
             Whether the trial gave nothing; then there is no value.
         reached
@@ -260,12 +262,14 @@ class RobotStudy:
             What the hand touched, of a study about an unknown shape:
             `{"contacts": [{"point": [x, y, z], "normal": [x, y, z]}, ...], "free": [[x, y, z, radius], ...]}` in the
             object's frame [m], normals outward; `free` is space without the object, and may be left out.
+        successes, of
+            In place of the value, of a study about success: so many successes of so many executions.
 
         Raises
         ------
         InputError
-            If there is no such trial, contacts are refused, the value or what was reached is not finite, or the trial
-            was told something else before. What was told before stays.
+            If there is no such trial, contacts are refused, the value or what was reached is not finite, successes are
+            no count or come with a value, or the trial was told something else before. What was told before stays.
         """
         with self.storage.failures():
             if contacts is not None:
@@ -276,7 +280,8 @@ class RobotStudy:
                     )
                 contacts = self._touched.checked(contacts, self._ledger.trials())
             outputs = self._checked(constraints, failed)
-            return self._ledger.tell(id, answer(self.settings.optimizer, value), failed, reached, outputs, contacts)
+            share, executions = answer(self.settings.optimizer, value, successes, of)
+            return self._ledger.tell(id, share, failed, reached, outputs, contacts, executions)
 
     def _checked(self, constraints: Mapping[str, Any] | None, failed: bool) -> dict[str, float]:
         values = checked_outputs(self.limits, constraints, failed)
@@ -291,9 +296,12 @@ class RobotStudy:
         reached: Mapping[str, Any] | None = None,
         constraints: Mapping[str, Any] | None = None,
         note: str = "added by hand",
+        successes: int | None = None,
+        of: int | None = None,
     ) -> int:
         """Store a trial that was made without being asked for, and return its id; arguments as in `tell`."""
-        number = checked_value(answer(self.settings.optimizer, value), failed)
+        share, executions = answer(self.settings.optimizer, value, successes, of)
+        number = checked_value(share, failed)
         commanded = self.settings.space.check(parameters)
         marks: dict[str, Any] = {NOTE: note}
         if reached is not None:
@@ -301,6 +309,8 @@ class RobotStudy:
         outputs = self._checked(constraints, failed)
         if outputs:
             marks[OUTPUTS] = outputs
+        if executions != 1:
+            marks[EXECUTIONS] = executions
         state = TrialState.FAIL if failed else TrialState.COMPLETE
         with self.storage.failures(), self.storage.handing_out(self.name):
             return self._ledger.store(state, commanded, marks, number).number

@@ -169,7 +169,12 @@ class Sampler(BaseSampler):
         history = history_of(study.get_trials(deepcopy=False), space, outputs=self.outputs)
         optimizer = self._new_optimizer(space, direction_of(study))
         optimizer.restore(
-            history.X, history.y, reached=history.reached, pending=history.pending, outputs=history.outputs
+            history.X,
+            history.y,
+            reached=history.reached,
+            pending=history.pending,
+            outputs=history.outputs,
+            of=history.executions,
         )
         return optimizer
 
@@ -211,7 +216,12 @@ class Sampler(BaseSampler):
                 _log.warning(f"The study has more than {MANY} trials: a place is judged by those near it from now on.")
             optimizer = self._kept[1]
             optimizer.restore(
-                history.X, history.y, reached=history.reached, pending=history.pending, outputs=history.outputs
+                history.X,
+                history.y,
+                reached=history.reached,
+                pending=history.pending,
+                outputs=history.outputs,
+                of=history.executions,
             )
             yield optimizer
 

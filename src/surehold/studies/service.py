@@ -148,8 +148,10 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
             reached=answer.reached,
             constraints=answer.constraints,
             contacts=None if answer.touches is None else answer.touches.model_dump(),
+            successes=answer.successes,
+            of=answer.of,
         )
-        return wire.Taken(id=told.id, state=told.state, value=told.value, already=told.already)
+        return wire.Taken(id=told.id, state=told.state, value=told.value, already=told.already, of=told.of)
 
     @app.get("/studies/{name}/recommendation", **protected)
     def recommendation() -> dict[str, Any]:
@@ -176,6 +178,8 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
             failed=addition.failed,
             reached=addition.reached,
             constraints=addition.constraints,
+            successes=addition.successes,
+            of=addition.of,
         )
         return wire.Added(id=id)
 

@@ -31,6 +31,9 @@ _Id = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=2**31 - 1, descript
 _Text = Annotated[str, Field(max_length=500)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Value = Annotated[_Finite | Literal["success", "failure"] | None, Field(description="Outcome; or success or failure.")]
+_Count = Annotated[
+    int | None, BeforeValidator(_whole), Field(description="In place of value: successes, of so many executions.")
+]
 _Outputs = Annotated[dict[str, _Finite | None] | None, Field(description="Further outputs by name.")]
 _Parameters = dict[str, int | _Finite | str | bool | None]
 
@@ -73,6 +76,8 @@ class Answer(_Request):
     failed: bool = False
     reached: Annotated[_Parameters | None, Field(description="What was truly reached, where it differs.")] = None
     constraints: _Outputs = None
+    successes: _Count = None
+    of: _Count = None
     touches: Annotated[Touches | None, Field(description="Of a study about an unknown shape.")] = None
 
 
@@ -84,6 +89,8 @@ class Addition(_Request):
     failed: bool = False
     reached: _Parameters | None = None
     constraints: _Outputs = None
+    successes: _Count = None
+    of: _Count = None
 
 
 class Veto(_Request):
@@ -117,6 +124,7 @@ class Taken(BaseModel):
     state: str
     value: float | None
     already: bool
+    of: int = 1
 
 
 class Added(BaseModel):

@@ -9,7 +9,7 @@ from typing import Any
 from optuna.trial import FrozenTrial, TrialState
 
 from surehold.studies.csv_cells import written_cell
-from surehold.studies.history import REACHED, parameters_of
+from surehold.studies.history import EXECUTIONS, REACHED, parameters_of
 from surehold.studies.ledger import NOTE, VETOED, holder_of
 from surehold.studies.robot import RobotStudy
 
@@ -50,8 +50,12 @@ def status(study: RobotStudy) -> dict[str, Any]:
 
 
 def rows(study: RobotStudy) -> list[dict[str, Any]]:
-    """Return one row a trial: id, state, value, parameters, what was reached, times, note."""
+    """Return one row a trial: id, state, value, parameters, what was reached, times, note.
+
+    Of a study about success also "of": of how many executions the value is the share that succeeded.
+    """
     found = []
+    counted = study.settings.optimizer.get("outcome") == "success"
     for trial in study.trials():
         parameters, reached = parameters_of(trial), trial.user_attrs.get(REACHED, {})
         names = study.settings.space.distributions
@@ -61,6 +65,7 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
                 "id": trial.number,
                 "state": _state(trial),
                 "value": trial.values[0] if trial.state == TrialState.COMPLETE and trial.values else None,
+                **({"of": trial.user_attrs.get(EXECUTIONS, 1)} if counted else {}),
                 **{name: parameters.get(name) for name in names},
                 **{f"reached_{name}": reached.get(name) for name in names},
                 "begun": trial.datetime_start.isoformat() if trial.datetime_start else None,
@@ -75,7 +80,19 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
 def to_csv(study: RobotStudy) -> str:
     """Return the trials as CSV with a header; an empty field is nothing, texts as in `csv_cells.written_cell`."""
     names = list(study.settings.space.distributions)
-    columns = ["id", "state", "value", *names, *(f"reached_{n}" for n in names), "begun", "finished", "worker", "note"]
+    of = ["of"] if study.settings.optimizer.get("outcome") == "success" else []
+    columns = [
+        "id",
+        "state",
+        "value",
+        *of,
+        *names,
+        *(f"reached_{n}" for n in names),
+        "begun",
+        "finished",
+        "worker",
+        "note",
+    ]
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()

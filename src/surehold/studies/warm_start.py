@@ -14,10 +14,11 @@ from optuna.trial import TrialState
 
 from surehold.errors import InputError
 from surehold.studies.csv_cells import cell_text
-from surehold.studies.history import REACHED
+from surehold.studies.history import EXECUTIONS, REACHED
 from surehold.studies.ledger import checked_value
 from surehold.studies.robot import RobotStudy
 from surehold.studies.storage import open_storage
+from surehold.studies.success import answer, count_told
 
 __all__ = ["FormerTrial", "former_study", "import_trials", "trials_of_csv", "trials_of_study"]
 
@@ -35,6 +36,8 @@ class FormerTrial(NamedTuple):
     failed: bool
     reached: Mapping[str, Any]
     """the parameters that were truly reached, where they are known"""
+    of: Any = None
+    """executions of which the value is the share that succeeded, where that is known"""
 
 
 def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> list[FormerTrial]:
@@ -46,7 +49,8 @@ def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> 
         Column of each parameter, {parameter: column}.
     value
         Column of the value; where it is empty, or a column "state" says so, the trial failed. Rows whose state is
-        running or waiting are left out. Columns reached_NAME hold what was truly reached.
+        running or waiting are left out. Columns reached_NAME hold what was truly reached; a column "of", into a study
+        about success, of how many executions the value is the share that succeeded.
 
     Raises
     ------
@@ -76,7 +80,8 @@ def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> 
         parameters = {name: cell_text((row[column] or "").strip()) for name, column in names.items()}
         failed = state in _FAILED or not told
         where = f"{Path(path).name}, line {reader.line_num}"
-        found.append(FormerTrial(where, parameters, None if failed else told, failed, reached))
+        of = None if failed else (row.get("of") or "").strip() or None
+        found.append(FormerTrial(where, parameters, None if failed else told, failed, reached, of))
     return found
 
 
@@ -96,7 +101,9 @@ def trials_of_study(study: Study, names: Mapping[str, str], direction: str) -> l
         parameters = {name: trial.params[there] for name, there in names.items() if there in trial.params}
         reached = {name: stored[there] for name, there in names.items() if there in stored}
         value = None if failed or not trial.values else sign * trial.values[0]
-        found.append(FormerTrial(f"{study.study_name}, trial {trial.number}", parameters, value, failed, reached))
+        where = f"{study.study_name}, trial {trial.number}"
+        of = None if failed else trial.user_attrs.get(EXECUTIONS)
+        found.append(FormerTrial(where, parameters, value, failed, reached, of))
     return found
 
 
@@ -114,9 +121,12 @@ def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: boo
         If a trial does not fit: a parameter is missing or outside its range, or the value is not finite.
     """
     good, left_out = [], []
+    settings = study.settings.optimizer
     for trial in trials:
         try:
-            checked_value(trial.value, trial.failed)
+            if trial.of is not None and settings.get("outcome") == "success":
+                trial = trial._replace(value=count_told(trial.value, trial.of))
+            checked_value(answer(settings, trial.value)[0], trial.failed)
             commanded = study.settings.space.check(trial.parameters)
             study.settings.space.check_reached(commanded, trial.reached)
             good.append(trial)

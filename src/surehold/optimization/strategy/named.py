@@ -36,8 +36,11 @@ def strategy_named(
     thesis: ThesisConstants | None,
     allowed: Allowed | None = None,
     outcome: str = "value",
+    counted: bool = False,
 ) -> Strategy:
     """Return the strategy of these settings, as of `Optimizer`; `noisy`: whether observations carry noise.
+
+    `counted`: whether the surrogate of successes is the beta process.
 
     Raises
     ------
@@ -77,7 +80,7 @@ def strategy_named(
                 )
         return ThesisImprovement(ranking, name, thesis.margin, float(kappa))
     if outcome == "success":
-        return Covering(SuccessImprovement(ranking), exactly=input_noise is None)
+        return Covering(SuccessImprovement(ranking, counted), exactly=input_noise is None)
     exactly = name.scale == "exact" and not averse
     strategy: Strategy
     if averse:

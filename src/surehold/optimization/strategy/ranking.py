@@ -73,7 +73,7 @@ class Ranking:
         if observed is not None and not self.noisy and self.exact_inputs:
             return np.argsort(-observed, kind="stable")
         if observed is not None and len(U) > CONTENDERS:
-            by_value = np.argsort(-observed, kind="stable")
+            by_value = _latest_of_equals(observed)
             likely = by_value[:CONTENDERS]
             return np.concatenate([likely[self.order(posterior, U[likely])], by_value[CONTENDERS:]])
         if self.screened:
@@ -165,9 +165,17 @@ class Ranking:
         if len(history.tried) <= CONTENDERS:
             return mixture(posterior.moments(history.tried))[0]
         values = np.full(len(history.tried), -np.inf)
-        likely = np.argsort(-history.observed, kind="stable")[:CONTENDERS]
+        likely = _latest_of_equals(history.observed)[:CONTENDERS]
         values[likely] = mixture(posterior.moments(history.tried[likely]))[0]
         return values
+
+
+def _latest_of_equals(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the order of values (n,), the highest first; of equal ones the latest, which was chosen by more trials.
+
+    Where trials only succeed or fail, all that succeeded are equal.
+    """
+    return len(values) - 1 - np.argsort(-values[::-1], kind="stable")
 
 
 def _outcomes(posterior: Posterior, perturbations: Perturbations, U: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.defaults import SETTLED
+from surehold.optimization.acquisition.beta_improvement import BetaImprovement
 from surehold.optimization.acquisition.probability_improvement import ProbabilityImprovement
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
 from surehold.optimization.acquisition.where_to_look import where_to_look
@@ -28,6 +29,8 @@ class SuccessImprovement:
     """Expected improvement of the probability of success, which the posterior is of."""
 
     ranking: Ranking
+    counted: bool = False
+    """whether the posterior is that of the beta process"""
 
     repeats: ClassVar[int] = 0
     continues_chains: ClassVar[bool] = False
@@ -40,7 +43,9 @@ class SuccessImprovement:
         if len(history.pending):
             posterior = posterior.with_pending(history.pending)
         objective: Objective
-        if self.ranking.exact_inputs and isinstance(posterior, SuccessPosterior):
+        if self.counted:
+            objective = BetaImprovement(posterior, self.ranking.coarse, best)
+        elif self.ranking.exact_inputs and isinstance(posterior, SuccessPosterior):
             objective = ProbabilityImprovement(posterior, best)
         else:
             objective = RiskImprovement(posterior, self.ranking.coarse, Risk(), best, rng)
