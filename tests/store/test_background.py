@@ -86,9 +86,8 @@ def test_a_folder_that_cannot_be_written_is_said_in_one_line(tmp_path):
     """A second set of kernels says nothing more."""
     other = "background.begin(Path('/dev/null/warm-y'), child, b'settings')"
     said = _run(tmp_path, f"marker = Path('/dev/null/warm-x')\n{other}")
-    assert said[0].startswith(
-        "compiled kernels cannot be kept (Not a directory), each process compiles anew; set NUMBA"
-    )
+    assert said[0].startswith("compiled kernels cannot be kept (")
+    assert said[0].endswith("each process compiles anew; set NUMBA_CACHE_DIR to a folder that can be written.")
     assert said[1:] == ["0 0", "[]"]
 
 

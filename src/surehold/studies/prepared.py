@@ -17,13 +17,11 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import Any, Final
 
 from optuna.trial import FrozenTrial
 
-from surehold.errors import SureholdError
 from surehold.studies.history import history_of
 from surehold.studies.proposer import begin, propose, take_up
 from surehold.studies.robot import Asked, RobotStudy
@@ -84,7 +82,7 @@ class Prepared:
             self._fill(trials, number, told)
             _, known, future = self._queue.popleft()
             return future.result(), told - known
-        except (BrokenProcessPool, SureholdError, OSError) as error:
+        except Exception as error:  # whatever it is: where this process meets it as well it is raised there
             _log.warning(
                 f"no proposals are prepared any more ({error or type(error).__name__}); each ask makes its own."
             )

@@ -35,6 +35,7 @@ def take_up(history: History, direction: str, prepared: range) -> None:
     global _optimizer, _made
     assert _study is not None
     settings, sampler = _study
+    _optimizer = None  # nothing is proposed where this fails
     _made = {number: _made[number] for number in prepared}
     pending = np.concatenate([history.pending, settings.space.encode_all(list(_made.values()))])
     with sampler.optimizing(settings.space, history._replace(pending=pending), direction) as _optimizer:
