@@ -21,8 +21,8 @@ from surehold.extras import require
 __all__ = ["Progress", "checked_backend", "run_campaign"]
 
 BACKENDS = ("loky", "dask")
-_PARCEL_SECONDS: Final = 0.5  # for which a worker makes runs before it reports them
-_LARGEST_PARCEL: Final = 200  # runs
+REPORTS: Final = 50  # a second, of all workers: one takes the calling process, with Dask's scheduler, some milliseconds
+LARGEST_PARCEL: Final = 200  # runs
 _THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -165,8 +165,8 @@ def _one_by_one(tasks: Sequence[Task]) -> Iterator[dict[str, Any]]:
 def _spread(tasks: Sequence[Task], workers: int, kind: str, address: str) -> Iterator[dict[str, Any]]:
     """Yield rows as workers finish them.
 
-    Short runs travel together: a worker takes a handful, works on them for `_PARCEL_SECONDS`, and sends back those that
-    it has not begun. A handful holds twice as many as were made of the one before, so that long runs travel alone.
+    Short runs travel together: a worker takes a parcel of them, reports after `parcel_seconds`, and sends back those
+    that it has not begun. A parcel holds twice as many as were made of the last one, so that long runs travel alone.
     """
     from concurrent.futures.process import BrokenProcessPool
 
@@ -177,11 +177,11 @@ def _spread(tasks: Sequence[Task], workers: int, kind: str, address: str) -> Ite
             while waiting or under_way:
                 while waiting and under_way < 2 * cores():  # one that is worked on, one that is ready
                     parcel = [waiting.popleft() for _ in range(min(size, 1 + len(waiting) // (2 * cores())))]
-                    executor.submit(_made_in_time, parcel).add_done_callback(done.put)
+                    executor.submit(_made_in_time, parcel, parcel_seconds(cores())).add_done_callback(done.put)
                     under_way += 1
                 rows, left = done.get().result()
                 under_way -= 1
-                size = min(2 * len(rows), _LARGEST_PARCEL)
+                size = min(2 * len(rows), LARGEST_PARCEL)
                 waiting.extendleft(reversed(left))
                 yield from rows
         except Exception as error:
@@ -193,9 +193,14 @@ def _spread(tasks: Sequence[Task], workers: int, kind: str, address: str) -> Ite
             ) from None
 
 
-def _made_in_time(tasks: list[Task]) -> tuple[list[dict[str, Any]], list[Task]]:
+def parcel_seconds(workers: int) -> float:
+    """Return for how long a worker makes runs before it reports them, so that all together make `REPORTS` a second."""
+    return max(0.5, workers / REPORTS)
+
+
+def _made_in_time(tasks: list[Task], seconds: float) -> tuple[list[dict[str, Any]], list[Task]]:
     """Make runs, one at least, until the time of a parcel is over; return their rows, and the tasks not begun."""
-    end = time.monotonic() + _PARCEL_SECONDS
+    end = time.monotonic() + seconds
     rows = [run_once(*tasks[0])]
     while len(rows) < len(tasks) and time.monotonic() < end:
         rows.append(run_once(*tasks[len(rows)]))
