@@ -23,6 +23,8 @@ __all__ = ["Progress", "checked_backend", "run_campaign"]
 BACKENDS = ("loky", "dask")
 REPORTS: Final = 50  # a second, of all workers: one takes the calling process, with Dask's scheduler, some milliseconds
 LARGEST_PARCEL: Final = 200  # runs
+_STALE: Final = 5.0  # seconds after which a cluster is asked again how many workers it has
+_ARRIVAL: Final = 60.0  # seconds to wait for its first one
 _THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -227,11 +229,22 @@ def _pool(kind: str, address: str, workers: int) -> Iterator[tuple[Executor, Cal
             cluster = stack.enter_context(
                 LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0")
             )
-        client = stack.enter_context(Client(cluster))
-        client.wait_for_workers(1)
+        try:
+            client: Any = stack.enter_context(Client(cluster))
+            client.wait_for_workers(1, timeout=_ARRIVAL)
+        except OSError as error:
+            where = f"the cluster at {address}" if address else "a cluster on this machine"
+            raise SureholdError(
+                f"{where} cannot be used: {error}. Start its scheduler, and a worker at least."
+            ) from None
         executor = client.get_executor(pure=False)
         stack.callback(executor.shutdown, wait=False)
-        yield (
-            executor,
-            lambda: max(sum(worker["nthreads"] for worker in client.scheduler_info(-1)["workers"].values()), 1),
-        )
+        known = float("-inf"), 0
+
+        def cores() -> int:
+            nonlocal known
+            if time.monotonic() - known[0] > _STALE:
+                known = time.monotonic(), sum(client.nthreads().values())
+            return max(known[1], 1)
+
+        yield executor, cores
