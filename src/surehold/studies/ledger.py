@@ -129,8 +129,8 @@ class Ledger:
     def orphan(self, trials: list[FrozenTrial], now: float) -> FrozenTrial | None:
         """Return the first running trial whose holder is dead; one that has killed too many is failed instead."""
         for trial in trials:
-            holder = holder_of(trial)
-            if trial.state != TrialState.RUNNING or holder is None or holder.until is None or now <= holder.until:
+            holder = holder_of(trial) if trial.state == TrialState.RUNNING else None
+            if holder is None or holder.until is None or now <= holder.until:
                 continue
             if holder.attempts < _ATTEMPTS:
                 return trial

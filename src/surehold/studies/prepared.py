@@ -22,7 +22,6 @@ from typing import Any, Final
 
 from optuna.trial import FrozenTrial
 
-from surehold.studies.history import history_of
 from surehold.studies.proposer import begin, propose, take_up
 from surehold.studies.robot import Asked, RobotStudy
 
@@ -110,7 +109,7 @@ class Prepared:
         assert self._child is not None
         following = number + len(self._queue)
         if not self._queue or told - self._known >= RENEWED:
-            history = history_of(trials, self._study.settings.space, outputs=self._study.sampler.outputs)
+            history = self._study.sampler.history(trials, self._study.settings.space)
             self._child.submit(take_up, history, self._study.settings.direction, range(number, following))
             self._known = told
         for k in range(following, number + AHEAD):

@@ -18,7 +18,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.limits import checked_outputs, limits_of
-from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, history_of, parameters_of
+from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
 from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
 from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend, written
 from surehold.studies.settings import SETTINGS, StudySettings
@@ -403,7 +403,7 @@ class RobotStudy:
     def _promise(self, trials: list[FrozenTrial]) -> float | None:
         if self._touched is not None:
             return None
-        history = history_of(trials, self.settings.space, outputs=self.sampler.outputs)
+        history = self.sampler.history(trials, self.settings.space)
         if len(trials) < self.n_initial or not np.isfinite(history.y).any():
             return None
         with self.sampler.optimizing(self.settings.space, history, self.settings.direction) as optimizer:
