@@ -10,7 +10,8 @@
 Trials outside of the search space (other parameters, other ranges) are left out.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from math import isfinite
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -21,7 +22,9 @@ from surehold.errors import InputError
 from surehold.optimization.success import MOST_EXECUTIONS
 from surehold.studies.search_space import SearchSpace
 
-__all__ = ["CONTACTS", "EXECUTIONS", "OUTPUTS", "REACHED", "History", "history_of", "parameters_of"]
+__all__ = ["CONTACTS", "EXECUTIONS", "OUTPUTS", "REACHED", "History", "Reader", "history_of", "parameters_of"]
+
+_DAMAGE: Final = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 #: Trial attribute that holds the parameters that were truly reached.
 REACHED: Final = "surehold:reached"
@@ -62,68 +65,107 @@ def history_of(
 
     `outputs` are the names of further outputs.
     """
-    ordered = sorted(trials, key=lambda trial: trial.number)
-    told: list[_Told] = []
-    pending: list[Mapping[str, Any]] = []
-    trial = None
-    try:
-        retried = set[int]()
-        for trial in ordered:
-            retried.update(trial.system_attrs.get("retry_history", ()))
-        for trial in ordered:
-            if trial.number == number or trial.number in retried:
-                continue
-            parameters = parameters_of(trial)
-            if not space.contains(parameters):
-                continue
-            if trial.state.is_finished():
-                told.append(_told(trial, parameters, space, outputs))
-            else:
-                pending.append(parameters)
-    except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
-        which = "a trial" if trial is None else f"trial {trial.number}"
-        raise InputError(f"{which} of the study is damaged ({error}); restore a copy of the storage.") from error
-    return History(
-        space.encode_all([row.parameters for row in told]),
-        np.array([row.value for row in told], dtype=np.float64),
-        space.encode_all([row.reached for row in told], anywhere=True),
-        space.encode_all(pending),
-        np.array([row.number for row in told], dtype=np.intp),
-        np.array([row.measured for row in told], dtype=np.float64).reshape(len(told), len(outputs)),
-        np.array([row.executions for row in told], dtype=np.intp),
-    )
+    return Reader(space, outputs).read(trials, number)
 
 
-class _Told(NamedTuple):
-    """A trial that was told or failed."""
+class Reader:
+    """Reads what the trials of a study say; what a finished one says is kept, for it does not change any more."""
 
-    number: int
-    parameters: Mapping[str, Any]
-    reached: Mapping[str, Any]
-    value: float
-    measured: list[float]
-    executions: int
+    def __init__(self, space: SearchSpace, outputs: Sequence[str] = ()):
+        self._space: Final = space
+        self._outputs: Final = tuple(outputs)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._known: dict[int, FrozenTrial] = {}
+        self._retried: set[int] = set()
+        d = self._space.encode_all([]).shape[1]
+        none, whole = np.empty((0, d)), np.empty(0, dtype=np.intp)
+        self._told = History(none, np.empty(0), none, none, whole, np.empty((0, len(self._outputs))), whole)
+
+    def read(self, trials: Iterable[FrozenTrial], number: int | None = None) -> History:
+        """Return what all trials of the study say, as `history_of` does.
+
+        Raises
+        ------
+        InputError
+            For a trial that holds what no trial of ours does: the storage was altered by hand, or is damaged.
+        """
+        trials = list(trials)
+        try:
+            return self._read(trials, number)
+        except _DAMAGE as error:
+            which = self._damaged(trials)
+            raise InputError(f"{which} of the study is damaged ({error}); restore a copy of the storage.") from error
+
+    def _damaged(self, trials: Sequence[FrozenTrial]) -> str:
+        for trial in trials:
+            self._forget()
+            try:
+                self._read([trial])
+            except _DAMAGE:
+                self._forget()
+                return f"trial {trial.number}"
+        self._forget()
+        return "a trial"
+
+    def _read(self, trials: list[FrozenTrial], number: int | None = None) -> History:
+        fresh = [trial for trial in trials if self._known.get(trial.number) is not trial]
+        if len(trials) - len(fresh) != len(self._known):  # of another study, or copies
+            self._forget()
+            fresh = trials
+        fresh.sort(key=lambda trial: trial.number)
+        finished = [trial for trial in fresh if trial.state.is_finished()]
+        pending = [trial for trial in fresh if not trial.state.is_finished()]
+        self._known |= {trial.number: trial for trial in finished}
+        self._retried |= _retried(finished)
+        self._add([trial for trial in finished if self._space.contains(trial.params)])
+        told = self._told
+        left_out = self._retried | _retried(pending) | ({number} if number is not None else set())
+        rows = np.argsort(told.numbers, kind="stable")
+        rows = rows[~np.isin(told.numbers[rows], list(left_out))]
+        under_way = [parameters_of(trial) for trial in pending if trial.number not in left_out]
+        return History._make(each[rows] for each in told)._replace(
+            pending=self._space.encode_all([p for p in under_way if self._space.contains(p)])
+        )
+
+    def _add(self, trials: Sequence[FrozenTrial]) -> None:
+        """Take in finished trials of this space."""
+        if not trials:
+            return
+        space, told = self._space, self._told
+        y = np.full(len(trials), np.nan)
+        outputs = np.empty((len(trials), len(self._outputs)))
+        executions = np.ones(len(trials), dtype=np.intp)
+        strayed: dict[int, dict[str, Any]] = {}
+        for i, trial in enumerate(trials):
+            if trial.state != TrialState.FAIL and trial.values and isfinite(trial.values[0]):
+                y[i] = trial.values[0]
+                of = trial.user_attrs.get(EXECUTIONS, 1)
+                executions[i] = of if type(of) is int and 0 < of <= MOST_EXECUTIONS else 1
+            actual = trial.params | trial.user_attrs.get(REACHED, {})
+            if actual != trial.params and space.encodes(actual):
+                strayed[i] = actual
+            if self._outputs:
+                attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
+                outputs[i] = [_finite(attributes.get(name)) for name in self._outputs]
+        commanded = [trial.params for trial in trials]
+        X = space.encode_all(commanded)
+        reached = space.encode_all(commanded, anywhere=True)
+        if strayed:
+            reached[list(strayed)] = space.encode_all(list(strayed.values()), anywhere=True)
+        numbers = np.array([trial.number for trial in trials], dtype=np.intp)
+        new = History(X, y, reached, np.empty_like(X), numbers, outputs, executions)
+        self._told = History._make(map(np.concatenate, zip(told, new, strict=True)))
 
 
-def _told(trial: FrozenTrial, parameters: Mapping[str, Any], space: SearchSpace, outputs: Sequence[str]) -> _Told:
-    value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
-    value = value if np.isfinite(value) else np.nan
-    actual = {**parameters, **trial.user_attrs.get(REACHED, {})}
-    attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
-    of = trial.user_attrs.get(EXECUTIONS, 1)
-    return _Told(
-        trial.number,
-        parameters,
-        actual if space.encodes(actual) else parameters,
-        value,
-        [_finite(attributes.get(name)) for name in outputs],
-        of if type(of) is int and 0 < of <= MOST_EXECUTIONS and np.isfinite(value) else 1,
-    )
+def _retried(trials: Iterable[FrozenTrial]) -> set[int]:
+    return {k for trial in trials for k in trial.system_attrs.get("retry_history", ())}
 
 
 def _finite(value: Any) -> float:
     """Return a number; NaN of what is none."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
         return np.nan
     return float(value)
 
