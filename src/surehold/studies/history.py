@@ -19,6 +19,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError
 from surehold.optimization.success import MOST_EXECUTIONS
+from surehold.optimization.values import LARGEST, LARGEST_SQUARED
 from surehold.studies.search_space import SearchSpace
 
 __all__ = ["CONTACTS", "EXECUTIONS", "OUTPUTS", "REACHED", "History", "history_of", "parameters_of"]
@@ -107,7 +108,7 @@ class _Told(NamedTuple):
 
 def _told(trial: FrozenTrial, parameters: Mapping[str, Any], space: SearchSpace, outputs: Sequence[str]) -> _Told:
     value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
-    value = value if np.isfinite(value) else np.nan
+    value = value if abs(value) <= LARGEST else np.nan
     actual = {**parameters, **trial.user_attrs.get(REACHED, {})}
     attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
     of = trial.user_attrs.get(EXECUTIONS, 1)
@@ -123,7 +124,7 @@ def _told(trial: FrozenTrial, parameters: Mapping[str, Any], space: SearchSpace,
 
 def _finite(value: Any) -> float:
     """Return a number; NaN of what is none."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST_SQUARED:
         return np.nan
     return float(value)
 
