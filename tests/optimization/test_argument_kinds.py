@@ -115,3 +115,13 @@ def test_numbers_beyond_the_range_of_floats():
     optimizer = Optimizer(BOX, constraints={"torque": (None, 0.0)})
     with pytest.raises(InputError, match="torque"):
         optimizer.tell([0.5, 0.5], 1.0, constraints={"torque": huge})
+
+
+def test_counts_beyond_measure():
+    for f in (
+        lambda: Optimizer(BOX).ask(10**9),
+        lambda: Optimizer(BOX, n_initial=10**9).ask(),
+        lambda: Box.unit(10**9),
+    ):
+        with pytest.raises(InputError, match="0,000"):
+            f()

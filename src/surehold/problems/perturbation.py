@@ -13,6 +13,8 @@ from surehold.problems.problem import Problem, checked_points
 
 __all__ = ["RobustScore", "perturbed_points", "robust_score"]
 
+_MOST = 10_000_000  # perturbations; more is a slip of the pen
+
 
 @dataclass(frozen=True)
 class RobustScore:
@@ -56,8 +58,8 @@ def perturbed_points(
     InputError
         If n is not a positive integer, or x lies outside the box.
     """
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
-        raise InputError(f"number of perturbations is {n!r}; give an integer of 1 or more.")
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= _MOST:
+        raise InputError(f"number of perturbations is {n!r}; give an integer from 1 to {_MOST:,}.")
     center, single = checked_points(x, box)
     if not single:
         raise InputError(f"x has shape {center.shape}; score one point ({box.dimension},) at a time.")

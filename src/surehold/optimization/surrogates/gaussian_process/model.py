@@ -33,7 +33,7 @@ from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
     learn,
     mode,
 )
-from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
+from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, kernel_number
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence, log_posterior
 from surehold.optimization.surrogates.gaussian_process.neighbors import NeighborPosterior
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization, checked_range
@@ -129,6 +129,9 @@ class GaussianProcess:
             raise InputError(f"length_scales are {length_scales!r}; give positive finite numbers, one a dimension.")
         self._posterior: GaussianProcessPosterior | NeighborPosterior | None = None
         self._learnt: OrderedDict[bytes, tuple[Standardization, Learnt]] = OrderedDict()  # saves time, changes nothing
+
+    def __repr__(self) -> str:
+        return f"GaussianProcess(kernel={KERNELS[self._kernel]!r}, noise={self._noise!r})"
 
     @property
     def known_noise(self) -> float | None:
