@@ -83,3 +83,14 @@ def test_bad_points():
         robust_score(RKHS(), [[0.5], [0.6]], noise)
     with pytest.raises(InputError, match="level"):
         robust_score(RKHS(), [0.5], noise, n=5).quantile(1.5)
+
+
+@pytest.mark.parametrize(
+    ("noise", "words"),
+    [(0.03, r"InputNoise\.unit\(0\.03\)"), ({"x": 0.03}, r"give sh\.InputNoise\(\{'x'"), (None, "is None")],
+)
+def test_what_is_no_input_noise_names_the_right_call(noise, words):
+    p = RKHS()
+    for score in (robust_score, lambda p, x, noise: p.expectation(x, noise)):
+        with pytest.raises(InputError, match=words):
+            score(p, [0.5], noise)

@@ -21,6 +21,7 @@ def number_of(y: Any) -> float:
         value = numbers_of(y)
     except (TypeError, ValueError, OverflowError):
         shown = " ".join(repr(y).split())
+        shown = shown if len(shown) <= 80 else f"{shown[:77]}..."
         raise InputError(f"y is {shown}; give one finite number, or failed=True.") from None
     if value.size != 1 or not np.isfinite(value).all():
         raise InputError(f"y is {y!r}; give one finite number, or failed=True for a trial that gave nothing.")

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, needed_input_noise
 from surehold.problems.problem import Problem, checked_points
 
 __all__ = ["RobustScore", "perturbed_points", "robust_score"]
@@ -67,7 +67,7 @@ def perturbed_points(
         raise InputError(f"x = {center[0].tolist()} lies outside {box!r}; score a point of the box.")
     rng = np.random.default_rng(seed)
     unit = box.to_unit(center[0])
-    reached = unit + noise.draws(box, unit, int(n), rng)
+    reached = unit + needed_input_noise(noise, box.names).draws(box, unit, int(n), rng)
     if border == "extend":
         return box.lower + reached * box.widths
     outside = (reached < 0.0) | (reached > 1.0)
