@@ -93,6 +93,17 @@ def test_people_by_commands(study):
     assert study("ask mug")["id"] == 3
 
 
+def test_a_fault_of_the_rig_and_a_wild_reading(study, capsys):
+    study(CREATE)
+    study("ask mug")
+    assert study("tell mug 0 --rig")["state"] == "waiting"
+    assert study("ask mug")["again"]
+    for value in (0.1, 0.5, -30, 0.3, 0.4):
+        study(f"add mug {value} --at dx={0.04 * abs(value) % 0.05},dy=0")
+    assert run(["study", "recommend", "mug"]) == 0
+    assert "Trial 3 gave a value so far on the bad side" in " ".join(capsys.readouterr().out.split())
+
+
 def test_plain_answers_are_for_people(capsys):
     for line in (CREATE, "ask mug", "tell mug 0 0.5", "status mug", "next mug", "recommend mug", "pause mug"):
         assert run(["study", *line.split()]) == 0

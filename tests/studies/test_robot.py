@@ -571,3 +571,25 @@ def test_what_was_read_once_is_read_again_as_if_anew(robot):
     asked = other.ask()
     other.tell(asked.id, 0.3)
     assert reader.read(other.trials()).y.tolist() == [0.3], "the trials of another study were kept"
+
+
+def test_a_fault_of_the_rig_teaches_nothing_and_the_trial_is_asked_for_again(robot):
+    asked = robot.ask("arm")
+    assert robot.tell(asked.id, failed="rig").state == "waiting"
+    again = robot.ask("another arm")
+    assert (again.id, again.parameters, again.again) == (asked.id, asked.parameters, True)
+    robot.tell(again.id, 0.5)
+    for id, arguments in ((again.id, {}), (99, {}), (robot.ask().id, {"value": 1.0})):
+        with pytest.raises(InputError):
+            robot.tell(id, failed="rig", **arguments)
+    with pytest.raises(InputError, match="'machine' is unknown"):
+        robot.tell(robot.ask().id, failed="machine")
+    assert [trial.state.name for trial in robot.trials()] == ["COMPLETE", "RUNNING", "RUNNING"]
+
+
+def test_what_is_recommended_can_be_commanded(robot):
+    """Where every trial went astray over the border, the nearest place inside is the answer."""
+    robot.tell(robot.ask().id, 0.6, reached={"dx": 0.07, "dy": 0.01})
+    assert robot.recommend().parameters == pytest.approx({"dx": 0.05, "dy": 0.01})
+    robot.tell(robot.ask().id, 0.5)
+    assert abs(robot.recommend().parameters["dx"]) <= 0.05

@@ -11,7 +11,6 @@ Trials outside of the search space (other parameters, other ranges) are left out
 """
 
 from collections.abc import Iterable, Sequence
-from math import isfinite
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -20,6 +19,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError
 from surehold.optimization.success import MOST_EXECUTIONS
+from surehold.optimization.values import LARGEST, LARGEST_SQUARED
 from surehold.studies.search_space import SearchSpace
 
 __all__ = ["CONTACTS", "EXECUTIONS", "OUTPUTS", "REACHED", "History", "Reader", "history_of", "parameters_of"]
@@ -139,7 +139,7 @@ class Reader:
         executions = np.ones(len(trials), dtype=np.intp)
         strayed: dict[int, dict[str, Any]] = {}
         for i, trial in enumerate(trials):
-            if trial.state != TrialState.FAIL and trial.values and isfinite(trial.values[0]):
+            if trial.state != TrialState.FAIL and trial.values and abs(trial.values[0]) <= LARGEST:
                 y[i] = trial.values[0]
                 of = trial.user_attrs.get(EXECUTIONS, 1)
                 executions[i] = of if type(of) is int and 0 < of <= MOST_EXECUTIONS else 1
@@ -165,7 +165,7 @@ def _retried(trials: Iterable[FrozenTrial]) -> set[int]:
 
 def _finite(value: Any) -> float:
     """Return a number; NaN of what is none."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST_SQUARED:
         return np.nan
     return float(value)
 

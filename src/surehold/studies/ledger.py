@@ -67,7 +67,7 @@ class Told:
 
     id: int
     state: str
-    """"complete" or "failed" """
+    """"complete", "failed", or "waiting" for a trial that is asked for again"""
     value: float | None
     already: bool
     """whether the same answer had been given before"""
@@ -192,6 +192,15 @@ class Ledger:
                 "answer counts; add the other one as a trial of its own if it was made."
             )
         return Told(id, state, number, True, executions)
+
+    def let_go(self, id: int) -> Told:
+        """Store that a trial is to be made again, whoever asks first, since it was not the place that failed."""
+        trial = self.trial(id)
+        if trial.state != TrialState.RUNNING:
+            what = answer_of(trial) if trial.state.is_finished() else "has not been handed out"
+            raise AnswerRefused(f"trial {id} is not under way ({what}); a fault of the rig is told of one that is.")
+        self.hold(trial, Holder("", 0.0, 0))
+        return Told(id, "waiting", None, False)
 
     def veto(self, id: int, reason: str) -> None:
         """Store that a trial must not be made; see `RobotStudy.veto`."""

@@ -107,12 +107,14 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         best = optimizer.recommend()
         told = np.flatnonzero(np.isfinite(history.y))
         distance = np.abs(optimizer.box.to_unit(history.reached[told]) - optimizer.box.to_unit(best.x)).max(axis=1)
+        # what was reached outside of the ranges cannot be commanded: the nearest place that can is the answer
+        inside = [optimizer.box.contains(place) for place in history.reached]
     same = told[distance <= distance.min() + 1e-9]
     row, best_row = int(same[np.argmax(sign * history.y[same])]), int(np.nanargmax(sign * history.y))
     number, best_number = int(history.numbers[row]), int(history.numbers[best_row])
     trial = next(t for t in trials if t.number == number)
     return StudyRecommendation(
-        trial.params | trial.user_attrs.get(REACHED, {}),
+        trial.params | (trial.user_attrs.get(REACHED, {}) if inside[row] else best.parameters),
         number,
         best.mean,
         best.std,

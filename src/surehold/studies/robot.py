@@ -9,14 +9,14 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import optuna
 from optuna.study import Study, StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
-from surehold.errors import InputError, SureholdError
+from surehold.errors import InputError, SureholdError, unknown_name
 from surehold.optimization.limits import checked_outputs, limits_of
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
 from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
@@ -237,7 +237,7 @@ class RobotStudy:
         id: int,
         value: Any = None,
         *,
-        failed: bool = False,
+        failed: bool | Literal["rig"] = False,
         reached: Mapping[str, Any] | None = None,
         constraints: Mapping[str, Any] | None = None,
         contacts: Mapping[str, Any] | None = None,
@@ -253,7 +253,8 @@ class RobotStudy:
         value
             Finite; larger is better. Of a study about success: "success" or "failure", True or False, or "7/10".
         failed
-            Whether the trial gave nothing; then there is no value.
+            True: the trial gave nothing, and has no value. "rig": the place is not at fault; nothing is learnt, and the
+            trial is handed out again, to whoever asks first.
         reached
             The parameters that were truly reached, all of them or those that differ; they may lie outside the ranges.
         constraints
@@ -271,7 +272,12 @@ class RobotStudy:
             If there is no such trial, contacts are refused, the value or what was reached is not finite, successes are
             no count or come with a value, or the trial was told something else before. What was told before stays.
         """
+        if failed not in (False, True, "rig"):
+            raise unknown_name("kind of failure", failed, ("True", "rig"))
         with self.storage.failures():
+            if failed == "rig":
+                checked_value(value, failed=True)
+                return self._ledger.let_go(id)
             if contacts is not None:
                 if self._touched is None:
                     raise InputError(
@@ -279,9 +285,9 @@ class RobotStudy:
                         "with: surehold explore --box x,y,z --study NAME."
                     )
                 contacts = self._touched.checked(contacts, self._ledger.trials())
-            outputs = self._checked(constraints, failed)
+            outputs = self._checked(constraints, bool(failed))
             share, executions = answer(self.settings.optimizer, value, successes, of)
-            return self._ledger.tell(id, share, failed, reached, outputs, contacts, executions)
+            return self._ledger.tell(id, share, bool(failed), reached, outputs, contacts, executions)
 
     def _checked(self, constraints: Mapping[str, Any] | None, failed: bool) -> dict[str, float]:
         values = checked_outputs(self.limits, constraints, failed)

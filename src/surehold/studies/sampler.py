@@ -21,7 +21,7 @@ from optuna.trial import FrozenTrial
 from surehold.defaults import MANY
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.protocol import Surrogate
 from surehold.studies.allowed import allowed_in
@@ -104,7 +104,7 @@ class Sampler(BaseSampler):
         self._lock = threading.RLock()
         # What is wrong is told now, not at the first trial.
         if self._space is None:
-            anything = InputNoise.unit(0.1) if input_noise is not None else None
+            anything = None if checked_input_noise(input_noise, ("x",)) is None else InputNoise.unit(0.1)
             Optimizer(Box.unit(1), input_noise=anything, **self._settings)
         elif self._space.box is not None:
             self._new_optimizer(self._space, "maximize")
