@@ -1,4 +1,4 @@
-"""Graded trials a minute of many poses, and the robust quality of one grasp: `python -m benchmarks.grasp_batch [object]`.
+"""Graded trials a minute of many poses, robust quality of one grasp: `python -m benchmarks.grasp_batch [object]`.
 
 Poses are those of a Latin hypercube over dx and dy from which the hand starts free, tried by one process and by two;
 wall time without the start of the processes. Then the quality of the middle one of the closed grasps under the default
@@ -8,15 +8,36 @@ noise of the pose, 100 trials, in one process and in two.
 import sys
 import time
 
+import numba
 import numpy as np
 from scipy.stats import qmc
 
 from surehold.grasping import grasp_batch
+from surehold.grasping.object.distance_field import field_distance
 from surehold.grasping.pose_noise import robust_quality
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.problems import GraspProblem
 
 POSES = 2000
+LOOKS = 100_000
+
+
+@numba.njit
+def _looks(nodes, frame, points):
+    total = 0.0
+    for i in range(len(points)):
+        total += field_distance(nodes, frame, points[i, 0], points[i, 1], points[i, 2])
+    return total
+
+
+def look(simulator):
+    """Return the CPU seconds of one look at the distance field: the least that a touch costs."""
+    half = simulator.object.box_half_extents
+    points = simulator.object.box_center + np.random.default_rng(0).uniform(-1.5, 1.5, (LOOKS, 3)) * half
+    _looks(simulator.field.nodes, simulator.field.frame, points[:1])
+    start = time.process_time()
+    _looks(simulator.field.nodes, simulator.field.frame, points)
+    return (time.process_time() - start) / LOOKS
 
 
 def rows(name: str = "mug", poses: int = POSES):

@@ -1,4 +1,4 @@
-"""Whether answering from the trials near by costs quality: `python -m benchmarks.switch [--seeds 4] [--starts 300 600]`.
+"""Whether answering from trials near by costs quality: `python -m benchmarks.switch [--seeds 4] [--starts 300 600]`.
 
 From `defaults.MANY` trials on a query is answered from those near it. For every problem, start and seed the same Latin
 hypercube of `start` trials is told to two optimizers, one that takes all trials together and one that takes those near
@@ -66,9 +66,8 @@ def main():
                 found = np.array([[run(name, start, s, many) for many in (ALL, NEAR)] for s in range(options.seeds)])
                 regrets, seconds = found[:, :, 0], found[:, :, 1].mean(axis=0)
                 error = np.sqrt(options.seeds)
-                together, near = (
-                    f"{m:.2e} +- {s / error:.0e}" for m, s in zip(regrets.mean(0), regrets.std(0, ddof=1))
-                )
+                means, spreads = regrets.mean(axis=0), regrets.std(axis=0, ddof=1) / error
+                together, near = (f"{m:.2e} +- {s:.0e}" for m, s in zip(means, spreads, strict=True))
                 lost = np.log10(regrets[:, 1] / regrets[:, 0])
                 decades = f"{lost.mean():+.2f} +- {lost.std(ddof=1) / error:.2f} decades"
                 times = f"{seconds[0]:.3f}, {seconds[1]:.3f} s"
