@@ -19,6 +19,7 @@ from benchmarks import campaign_overhead, grasp_batch, growth, stored, study_ove
 from benchmarks.stored import Row
 from surehold.campaigns.methods import Surehold
 from surehold.campaigns.peers import installed_peers
+from surehold.defaults import MANY
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems import GraspProblem
 
@@ -75,7 +76,7 @@ def grown(quick: bool) -> Iterator[Row]:
     for name, (cold, warm, memory) in growth.rows((300, 1000) if quick else growth.SIZES):
         n = int(name.split(",")[0].removeprefix("n = "))
         yield Row(f"first ask, default, {name}", cold, 2.0 if n in GROWTH else None)
-        yield Row(f"ask, default, {name} ({memory:.0f} MB)", warm, GROWTH.get(n))
+        yield Row(f"ask, default, {name}", warm, GROWTH.get(n), factorization(min(n, MANY)), memory)
 
 
 def grasps(quick: bool) -> Iterator[Row]:

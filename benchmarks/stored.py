@@ -26,6 +26,8 @@ class Row(NamedTuple):
     floor: float | None = None
     """seconds of the least that has to be done: dpotrf of the trials' matrix, a copy of the trials, one look at the
     distance field"""
+    megabytes: float | None = None
+    """most memory that the process held"""
 
 
 def last(folder: Path = FOLDER) -> dict[str, float]:
@@ -53,7 +55,8 @@ def lines(rows: Sequence[Row], yardstick: float, before: Mapping[str, float]) ->
         marks += "  SLOWER" * (ratio is not None and ratio > LOSS)
         shown = "new" if ratio is None else f"{ratio:.2f}"
         asked, floor = (_times(row.seconds, limit) for limit in (row.asked, row.floor))
-        yield f"{row.name:62} {row.seconds:10.4f} {units:10.0f} {asked:>9} {floor:>9} {shown:>12}{marks}"
+        held = "" if row.megabytes is None else f"  {row.megabytes:.0f} MB"
+        yield f"{row.name:62} {row.seconds:10.4f} {units:10.0f} {asked:>9} {floor:>9} {shown:>12}{held}{marks}"
 
 
 def store(rows: Sequence[Row], yardstick: float, load: float = 0.0, folder: Path = FOLDER) -> Path:

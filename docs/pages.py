@@ -93,10 +93,11 @@ def _speed() -> str:
     stored = json.loads(path.read_text(encoding="utf-8"))
     load = f"{stored['load']:.0f} processes wanted to run at its start"
     text = SPEED.format(name=path.name, machine=stored["machine"], load=load, yardstick=1e3 * stored["yardstick"])
-    lines = ["| | seconds | times asked | times the floor |", "|---|---|---|---|"]
+    lines = ["| | seconds | times asked | times the floor | MB |", "|---|---|---|---|---|"]
     for name, row in stored["rows"].items():
         ratios = [f"{row['seconds'] / row[limit]:.3g}" if limit in row else "" for limit in ("asked", "floor")]
-        lines.append(f"| {name} | {row['seconds']:.4g} | {' | '.join(ratios)} |")
+        held = f"{row['megabytes']:.0f}" if "megabytes" in row else ""
+        lines.append(f"| {name} | {row['seconds']:.4g} | {' | '.join(ratios)} | {held} |")
     return "\n".join([text, *lines]) + "\n"
 
 
