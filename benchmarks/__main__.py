@@ -65,8 +65,9 @@ def asks(quick: bool) -> Iterator[Row]:
             yield Row(f"ask, {name}, n = {n}, d = {d}", seconds)
         for name, (settings, share) in OURS.items():
             maker = lambda d, X, seed, s=settings: Surehold(d, X, seed, *s)  # noqa: E731
-            shares = {"optuna-gp": share if d == 7 else 0.2, "botorch": BOTORCH if d == 7 else 0.1}
-            asked = min((shares[peer] * seconds for peer, seconds in theirs.items()), default=None)
+            shares = {"optuna-gp": share, "botorch": BOTORCH} if d == 7 else {"optuna-gp": 0.2, "botorch": 0.1}
+            counted = () if d == 2 and settings[0] is not None else theirs.items()  # nothing was asked of those
+            asked = min((shares[peer] * seconds for peer, seconds in counted), default=None)
             seconds = suggestion_time.seconds_per_ask(maker, n, d)
             yield Row(f"ask, surehold {name}, n = {n}, d = {d}", seconds, asked, factorization(n))
 
