@@ -38,6 +38,10 @@ def test_benchmarks_are_of_the_results(tmp_path):
     text = (tmp_path / "benchmarks.md").read_text()
     assert "| RKHS | surehold robust | mean under input noise |" in text
     assert "Made with surehold" in text
+    stored = json.loads(max(ROOT.glob("results/benchmarks/*.json")).read_text())
+    name, row = next((name, row) for name, row in stored["rows"].items() if "asked" in row)
+    speed = (tmp_path / "speed.md").read_text()
+    assert f"| {name} | {row['seconds']:.4g} | {row['seconds'] / row['asked']:.3g} |" in speed
 
 
 def rows_of_validation():

@@ -10,7 +10,8 @@
 Trials outside of the search space (other parameters, other ranges) are left out.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -23,8 +24,6 @@ from surehold.optimization.values import LARGEST, LARGEST_SQUARED
 from surehold.studies.search_space import SearchSpace
 
 __all__ = ["CONTACTS", "EXECUTIONS", "OUTPUTS", "REACHED", "History", "Reader", "history_of", "parameters_of"]
-
-_DAMAGE: Final = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 #: Trial attribute that holds the parameters that were truly reached.
 REACHED: Final = "surehold:reached"
@@ -79,88 +78,88 @@ class Reader:
     def _forget(self) -> None:
         self._known: dict[int, FrozenTrial] = {}
         self._retried: set[int] = set()
-        d = self._space.encode_all([]).shape[1]
-        none, whole = np.empty((0, d)), np.empty(0, dtype=np.intp)
-        self._told = History(none, np.empty(0), none, none, whole, np.empty((0, len(self._outputs))), whole)
+        self._history = self._of([])  # of the finished trials of this space, in the order in which they were read
 
     def read(self, trials: Iterable[FrozenTrial], number: int | None = None) -> History:
         """Return what all trials of the study say, as `history_of` does.
 
-        Raises
-        ------
-        InputError
-            For a trial that holds what no trial of ours does: the storage was altered by hand, or is damaged.
+        Raises InputError, naming the trial, where what is stored of one cannot be read.
         """
         trials = list(trials)
-        try:
-            return self._read(trials, number)
-        except _DAMAGE as error:
-            which = self._damaged(trials)
-            raise InputError(f"{which} of the study is damaged ({error}); restore a copy of the storage.") from error
-
-    def _damaged(self, trials: Sequence[FrozenTrial]) -> str:
-        for trial in trials:
-            self._forget()
-            try:
-                self._read([trial])
-            except _DAMAGE:
-                self._forget()
-                return f"trial {trial.number}"
-        self._forget()
-        return "a trial"
-
-    def _read(self, trials: list[FrozenTrial], number: int | None = None) -> History:
         fresh = [trial for trial in trials if self._known.get(trial.number) is not trial]
         if len(trials) - len(fresh) != len(self._known):  # of another study, or copies
             self._forget()
             fresh = trials
-        fresh.sort(key=lambda trial: trial.number)
-        finished = [trial for trial in fresh if trial.state.is_finished()]
-        pending = [trial for trial in fresh if not trial.state.is_finished()]
-        self._known |= {trial.number: trial for trial in finished}
-        self._retried |= _retried(finished)
-        self._add([trial for trial in finished if self._space.contains(trial.params)])
-        told = self._told
-        left_out = self._retried | _retried(pending) | ({number} if number is not None else set())
-        rows = np.argsort(told.numbers, kind="stable")
-        rows = rows[~np.isin(told.numbers[rows], list(left_out))]
-        under_way = [parameters_of(trial) for trial in pending if trial.number not in left_out]
-        return History._make(each[rows] for each in told)._replace(
-            pending=self._space.encode_all([p for p in under_way if self._space.contains(p)])
+        told: list[_Told] = []
+        pending: dict[int, Mapping[str, Any]] = {}
+        known: dict[int, FrozenTrial] = {}
+        retried, of_pending = set[int](), set[int]()
+        trial = None
+        try:
+            for trial in sorted(fresh, key=lambda trial: trial.number):
+                finished = trial.state.is_finished()
+                (retried if finished else of_pending).update(trial.system_attrs.get("retry_history", ()))
+                parameters = parameters_of(trial)
+                inside = self._space.contains(parameters)
+                if finished:
+                    known[trial.number] = trial
+                    told += [_told(trial, parameters, self._space, self._outputs)] if inside else []
+                elif inside:
+                    pending[trial.number] = parameters
+        except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+            which = "a trial" if trial is None else f"trial {trial.number}"
+            raise InputError(f"{which} of the study is damaged ({error}); restore a copy of the storage.") from error
+        if told:
+            self._history = History._make(map(np.concatenate, zip(self._history, self._of(told), strict=True)))
+        self._known |= known
+        self._retried |= retried
+        left_out = self._retried | of_pending | {number}
+        numbers = self._history.numbers
+        rows = np.argsort(numbers, kind="stable")
+        rows = rows[~np.isin(numbers[rows], [k for k in left_out if isinstance(k, int)])]
+        under_way = self._space.encode_all([row for k, row in pending.items() if k not in left_out])
+        told_so_far = self._history._replace(pending=self._history.X)  # any rows
+        return History._make(each[rows] for each in told_so_far)._replace(pending=under_way)
+
+    def _of(self, rows: Sequence["_Told"]) -> History:
+        """Return the history of finished trials."""
+        X = self._space.encode_all([row.parameters for row in rows])
+        return History(
+            X,
+            np.array([row.value for row in rows], dtype=np.float64),
+            self._space.encode_all([row.reached for row in rows], anywhere=True),
+            X[:0],
+            np.array([row.number for row in rows], dtype=np.intp),
+            np.array([row.measured for row in rows], dtype=np.float64).reshape(len(rows), len(self._outputs)),
+            np.array([row.executions for row in rows], dtype=np.intp),
         )
 
-    def _add(self, trials: Sequence[FrozenTrial]) -> None:
-        """Take in finished trials of this space."""
-        if not trials:
-            return
-        space, told = self._space, self._told
-        y = np.full(len(trials), np.nan)
-        outputs = np.empty((len(trials), len(self._outputs)))
-        executions = np.ones(len(trials), dtype=np.intp)
-        strayed: dict[int, dict[str, Any]] = {}
-        for i, trial in enumerate(trials):
-            if trial.state != TrialState.FAIL and trial.values and abs(trial.values[0]) <= LARGEST:
-                y[i] = trial.values[0]
-                of = trial.user_attrs.get(EXECUTIONS, 1)
-                executions[i] = of if type(of) is int and 0 < of <= MOST_EXECUTIONS else 1
-            actual = trial.params | trial.user_attrs.get(REACHED, {})
-            if actual != trial.params and space.encodes(actual):
-                strayed[i] = actual
-            if self._outputs:
-                attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
-                outputs[i] = [_finite(attributes.get(name)) for name in self._outputs]
-        commanded = [trial.params for trial in trials]
-        X = space.encode_all(commanded)
-        reached = space.encode_all(commanded, anywhere=True)
-        if strayed:
-            reached[list(strayed)] = space.encode_all(list(strayed.values()), anywhere=True)
-        numbers = np.array([trial.number for trial in trials], dtype=np.intp)
-        new = History(X, y, reached, np.empty_like(X), numbers, outputs, executions)
-        self._told = History._make(map(np.concatenate, zip(told, new, strict=True)))
+
+class _Told(NamedTuple):
+    """A trial that was told or failed."""
+
+    number: int
+    parameters: Mapping[str, Any]
+    reached: Mapping[str, Any]
+    value: float
+    measured: list[float]
+    executions: int
 
 
-def _retried(trials: Iterable[FrozenTrial]) -> set[int]:
-    return {k for trial in trials for k in trial.system_attrs.get("retry_history", ())}
+def _told(trial: FrozenTrial, parameters: Mapping[str, Any], space: SearchSpace, outputs: Sequence[str]) -> _Told:
+    value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
+    value = value if abs(value) <= LARGEST else np.nan
+    actual = {**parameters, **trial.user_attrs.get(REACHED, {})}
+    attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {}) if outputs else {}
+    of = trial.user_attrs.get(EXECUTIONS, 1)
+    return _Told(
+        trial.number,
+        parameters,
+        actual if actual != parameters and space.encodes(actual) else parameters,
+        value,
+        [_finite(attributes.get(name)) for name in outputs],
+        of if type(of) is int and 0 < of <= MOST_EXECUTIONS and isfinite(value) else 1,
+    )
 
 
 def _finite(value: Any) -> float:
