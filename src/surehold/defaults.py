@@ -314,6 +314,10 @@ BETA_PRIOR: Final = (1.0, 1.0)
 SUCCESS_BURN_IN: Final = 20
 #: Joint draws by which the spread of a share of successes under the input noise is known. Never measured.
 SUCCESS_DRAWS: Final = 64
+#: Places that the probit model takes at most: beyond, trials near each other count as several executions at their mean,
+#: and hyperparameters are learnt from `MANY_LEARNT` of them. An ask of 800 trials takes as long as one of 400.
+#: python -m benchmarks.success_outcomes --problems "" --methods success --sizes 100,400,800,10000
+SUCCESS_PLACES: Final = 400
 #: A place whose probability of success is known to this standard deviation is settled: it is not tried again as long
 #: as there are others. After the estimation bounds of Tesch et al. 2013. Never measured against others.
 SETTLED: Final = 0.02

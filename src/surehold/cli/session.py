@@ -98,7 +98,7 @@ def run_session(
 
     A run that is kept as a study is resumed where that exists.
 
-    `required` are the settings of an `Optimizer` for constraints: allowed, constraints, feasible.
+    `required` are further settings of an `Optimizer`: surrogate, and those of constraints and failures.
 
     `describe` adds to a candidate what the problem knows of it; `also_write` writes further files. Where no trial is
     worth more than `success_above`, the report says so first, with the counts of `outcomes` and `advice`; what the

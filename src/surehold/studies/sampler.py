@@ -18,7 +18,7 @@ from optuna.search_space import IntersectionSearchSpace
 from optuna.study import Study, StudyDirection
 from optuna.trial import FrozenTrial
 
-from surehold.defaults import MANY
+from surehold.defaults import MANY, SUCCESS_PLACES
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
@@ -50,14 +50,15 @@ class Sampler(BaseSampler):
         Non-negative integer.
     surrogate
         As in `Optimizer`, whose default None stands for. It carries tens of thousands of trials: from
-        `surehold.defaults.MANY` on a place is judged by the trials near it, which is said once.
+        `surehold.defaults.MANY` on a place is judged by the trials near it (of successes, from `SUCCESS_PLACES` on near
+        ones count together), which is said once.
     warn_independent_sampling
         Whether to warn when a parameter is drawn at random because it is not in the search space.
     **settings
         Of `Optimizer`: criterion, n_initial, design, noise, output_range, quadrature, k, border, kappa, risk, preset,
-        allowed, constraints, feasible. A function `allowed` takes the parameters {name: value}. The further outputs of
-        a trial are its attributes of that name: `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets
-        start anew for every suggestion.
+        allowed, constraints, feasible, safety, failures, initial_points, outcome. A function `allowed` takes the
+        parameters {name: value}. The further outputs of a trial are its attributes of that name:
+        `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets start anew for every suggestion.
 
     The direction of the study decides whether values are maximized or minimized; several objectives are refused.
 
@@ -89,6 +90,8 @@ class Sampler(BaseSampler):
     ):
         if "direction" in settings:
             raise InputError("a sampler has no direction of its own; say optuna.create_study(direction=...).")
+        if settings.get("outcome") == "preference":
+            raise InputError("a study keeps no preferences; make a surehold.Optimizer, and tell_preference(...).")
         if search_space is None or isinstance(search_space, SearchSpace):
             self._space = search_space
         else:
@@ -203,8 +206,10 @@ class Sampler(BaseSampler):
 
     def n_initial(self, space: SearchSpace) -> int:
         """Return the size of the initial design in a search space."""
-        given = self._settings.get("n_initial")
-        return Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given
+        given, first = self._settings.get("n_initial"), len(self._settings.get("initial_points") or ())
+        if self._settings.get("safety") is not None:
+            return first
+        return max(Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given, first)
 
     @contextmanager
     def optimizing(self, space: SearchSpace, history: History, direction: str) -> Iterator[Optimizer]:
@@ -219,10 +224,11 @@ class Sampler(BaseSampler):
             key = (tuple(space.distributions.items()), direction)
             if self._kept is None or self._kept[0] != key:
                 self._kept = (key, self._new_optimizer(space, direction))
-            if len(history.y) > MANY and not self._said:
-                self._said = True
-                _log.warning(f"The study has more than {MANY} trials: a place is judged by those near it from now on.")
             optimizer = self._kept[1]
+            many = SUCCESS_PLACES if optimizer.outcome == "success" else MANY
+            if len(history.y) > many and not self._said:
+                self._said = True
+                _log.warning(f"The study has more than {many} trials: a place is judged by those near it from now on.")
             optimizer.restore(
                 history.X,
                 history.y,
