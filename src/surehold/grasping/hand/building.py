@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.grasping.hand.coupling import JointCouplings
 from surehold.grasping.hand.cover import SHORTEST
 from surehold.grasping.hand.geometry import link_capsules, palm_boxes
 from surehold.grasping.hand.model import Hand, chain_row
@@ -35,11 +36,11 @@ def built_hand(rest: RestingModel, file: str) -> Hand:
         chains[i, :n], radii[i, :n] = row["chain"], row["radii"]
         for k, j in enumerate(row["joints"]):
             if j is not None:
-                names[i][k] = rest.model.joint(j).name
+                names[i][k] = rest.joint_names[j]
                 lower[i, k], upper[i, k] = rest.range(j)
         links[i][:n] = row["links"]
     boxes = palm_boxes(rest)
-    flat = tuple(name for row in names for name in row)
+    flat, couplings = tuple(name for row in names for name in row), JointCouplings(rest)
     return Hand(
         name=config.name,
         bases=np.stack([row["base"] for row in rows]),
@@ -54,7 +55,7 @@ def built_hand(rest: RestingModel, file: str) -> Hand:
         finger_names=tuple(rest.fingers),
         link_names=tuple(name for row in links for name in row),
         joint_names=flat,
-        preshapes={name: described_preshape(name, config, flat, lower, upper) for name in config.preshapes},
+        preshapes={name: described_preshape(name, rest, couplings, flat) for name in config.preshapes},
         finger_force=config.finger_force,
         friction=config.friction,
         model=rest.source(file),

@@ -25,9 +25,9 @@ def link_capsules(rest: RestingModel, finger: str, k: int) -> Iterator[tuple[str
     allowed = rest.config.contact_links
     for name in allowed or []:
         if name not in rest.body_ids:
-            raise unknown_name("body", name, [known for known in rest.body_ids if known])
+            raise unknown_name("body", name, rest.body_names)
     for body, owner in rest.of_body.items():
-        name = rest.model.body(body).name
+        name = rest.body_names[body]
         if owner != (finger, k) or (allowed is not None and name not in allowed):
             continue
         for g in _geometries(rest, body):

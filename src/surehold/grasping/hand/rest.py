@@ -23,20 +23,23 @@ class RestingModel:
 
     `fingers` holds the joints of each finger by their numbers in the model, `of_body` the finger and the place in it of
     the joint that moves a body, `of_palm` the bodies that move with the palm; `turn` (3, 3) and `origin` (3,) are the
-    palm frame in the frame of the model's file.
+    palm frame in the frame of the model's file. Bodies and joints without a name are "body 3" and "joint 0", by their
+    number.
     """
 
     def __init__(self, mujoco: Any, model: Any, config: HandConfig):
         self.mujoco, self.model, self.config = mujoco, model, config
         self.data = mujoco.MjData(model)
-        self.joint_ids = {model.joint(j).name: j for j in range(model.njnt)}
-        self.body_ids = {model.body(b).name: b for b in range(model.nbody)}
+        self.joint_names = [model.joint(j).name or f"joint {j}" for j in range(model.njnt)]
+        self.body_names = [model.body(b).name or f"body {b}" for b in range(model.nbody)]
+        self.joint_ids = {name: j for j, name in enumerate(self.joint_names)}
+        self.body_ids = {name: b for b, name in enumerate(self.body_names)}
         if not model.njnt:
             raise InputError(f"the model of hand '{config.name}' has no joint; give a hand whose fingers move.")
         self.fingers = {finger: [self._joint(name) for name in names] for finger, names in config.fingers.items()}
         moving = [j for joints in self.fingers.values() for j in joints]
         if len(set(moving)) != len(moving):
-            twice = next(model.joint(j).name for j in moving if moving.count(j) > 1)
+            twice = next(self.joint_names[j] for j in moving if moving.count(j) > 1)
             raise InputError(f"hand '{config.name}' names joint '{twice}' twice; a joint moves one finger.")
         for j in range(model.njnt):
             if self.moves(j):
@@ -45,7 +48,7 @@ class RestingModel:
         mujoco.mj_kinematics(model, self.data)
         palm = config.palm
         if palm.body not in self.body_ids:
-            raise unknown_name("body", palm.body, [name for name in self.body_ids if name])
+            raise unknown_name("body", palm.body, self.body_names)
         self.palm_body = self.body_ids[palm.body]
         z, x = np.asarray(palm.z), np.asarray(palm.x)
         if np.linalg.norm(z) < 1e-6 or np.linalg.norm(np.cross(z, x)) < 1e-3 * np.linalg.norm(z) * np.linalg.norm(x):
@@ -68,7 +71,7 @@ class RestingModel:
             self.config.palm.body,
             inside,
             np.column_stack([self.turn, self.origin]),
-            tuple(self.model.joint(j).name for _, j in order),
+            tuple(self.joint_names[j] for _, j in order),
             tuple(float(self.data.qpos[place]) for place, _ in order),
         )
 
@@ -78,7 +81,7 @@ class RestingModel:
 
     def _joint(self, name: str) -> int:
         if name not in self.joint_ids:
-            raise unknown_name("joint", name, [known for known in self.joint_ids if known])
+            raise unknown_name("joint", name, self.joint_names)
         j = self.joint_ids[name]
         if not self.moves(j):
             raise InputError(f"joint '{name}' of hand '{self.config.name}' neither turns nor slides about one axis.")
@@ -105,14 +108,14 @@ class RestingModel:
             for k, j in enumerate(joints):
                 body = int(self.model.jnt_bodyid[j])
                 if k and int(self.model.jnt_bodyid[joints[k - 1]]) not in self._above(body):
-                    before = self.model.joint(joints[k - 1]).name
+                    before = self.joint_names[joints[k - 1]]
                     raise InputError(
-                        f"finger '{finger}': joint '{self.model.joint(j).name}' is not moved by '{before}'; name the "
+                        f"finger '{finger}': joint '{self.joint_names[j]}' is not moved by '{before}'; name the "
                         "joints of a finger from the palm to the tip."
                     )
                 if self.palm_body not in self._above(body):
                     raise InputError(
-                        f"finger '{finger}': joint '{self.model.joint(j).name}' is not below the palm "
+                        f"finger '{finger}': joint '{self.joint_names[j]}' is not below the palm "
                         f"'{self.config.palm.body}'."
                     )
                 last[body] = (finger, k)
