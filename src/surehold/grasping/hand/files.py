@@ -2,25 +2,24 @@
 
 Fingers close on capsules that cover the model's collision geometries (geometry.py); a model without collision
 geometries on a finger is refused. Nothing in a model is executed, and no plugin is loaded; meshes are read from the
-folder that the model names.
+folder that the model names (urdf.py says which).
 """
 
 import importlib
 import importlib.util
-import stat
 import warnings
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from surehold.errors import InputError
 from surehold.grasping.hand.building import built_hand
 from surehold.grasping.hand.configuration import HandConfig, read_hand_config
 from surehold.grasping.hand.model import Hand
 from surehold.grasping.hand.rest import RestingModel
+from surehold.grasping.hand.urdf import read_urdf
+from surehold.grasping.plain_data import regular_bytes
 
 __all__ = ["load_hand", "packaged_hand"]
-
-_MOST_BYTES: Final = 64 * 2**20
 
 
 def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
@@ -40,15 +39,11 @@ def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
     path = Path(model)
     if path.suffix.lower() not in (".xml", ".urdf", ".mjcf"):
         raise InputError(f"{str(model)!r} is no model of a hand; give an .xml (MJCF) or .urdf file.")
+    regular_bytes(path)  # MuJoCo reads the file itself, and a pipe might never end
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):  # reading a pipe or a device might never end
-            raise InputError(f"{str(model)!r} is no regular file; give a model on disk.")
-        if status.st_size > _MOST_BYTES:
-            raise InputError(f"{str(model)!r} is larger than 64 MB; give a model of the hand alone.")
         compiled = _compiled(mujoco, path)
-    except OSError as error:
-        raise InputError(f"cannot read {str(model)!r}: {error.strerror}.") from None
+    except InputError:
+        raise
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())[:160]
         raise InputError(f"{str(model)!r} is not a model that MuJoCo can read: {reason}.") from None
@@ -88,7 +83,11 @@ def _compiled(mujoco: Any, path: Path) -> Any:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            spec = mujoco.MjSpec.from_file(str(path))
+            if path.suffix.lower() == ".urdf":
+                text, assets = read_urdf(path)
+                spec = mujoco.MjSpec.from_string(text, assets=assets)
+            else:
+                spec = mujoco.MjSpec.from_file(str(path))
             spec.compiler.fusestatic = False  # bodies keep their names
             # Nothing moves by forces here: inertias that no body can have shall not refuse a hand.
             spec.compiler.balanceinertia, spec.compiler.boundmass, spec.compiler.boundinertia = True, 1e-6, 1e-12
