@@ -19,7 +19,7 @@ from surehold.grasping.hand.rest import RestingModel
 from surehold.grasping.hand.urdf import read_urdf
 from surehold.grasping.plain_data import regular_bytes
 
-__all__ = ["load_hand", "packaged_hand"]
+__all__ = ["load_hand", "packaged_hand", "read_model"]
 
 
 def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
@@ -28,29 +28,39 @@ def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
     Raises
     ------
     InputError
-        If MuJoCo is not installed, a file cannot be read, or the description does not fit the model: the message
-        lists what the model has.
+        As `read_model`, or if the description does not fit the model: the message lists what the model has.
+    """
+    described = config if isinstance(config, HandConfig) else read_hand_config(config)
+    mujoco, compiled = read_model(model)
+    try:
+        return built_hand(RestingModel(mujoco, compiled, described), str(model))
+    except UnicodeDecodeError:
+        raise InputError(f"{str(model)!r} has names that are no UTF-8; save it as UTF-8.") from None
+
+
+def read_model(model: str | Path) -> tuple[Any, Any]:
+    """Return MuJoCo and the compiled model of a file (.xml of MuJoCo or .urdf).
+
+    Raises
+    ------
+    InputError
+        If MuJoCo is not installed, or the file cannot be read.
     """
     try:
         mujoco: Any = importlib.import_module("mujoco")  # its names are not in its type information
     except ImportError:
         raise InputError("reading a hand needs MuJoCo; install it with: pip install 'surehold[mujoco]'.") from None
-    described = config if isinstance(config, HandConfig) else read_hand_config(config)
     path = Path(model)
     if path.suffix.lower() not in (".xml", ".urdf", ".mjcf"):
         raise InputError(f"{str(model)!r} is no model of a hand; give an .xml (MJCF) or .urdf file.")
     regular_bytes(path)  # MuJoCo reads the file itself, and a pipe might never end
     try:
-        compiled = _compiled(mujoco, path)
+        return mujoco, _compiled(mujoco, path)
     except InputError:
         raise
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())[:160]
         raise InputError(f"{str(model)!r} is not a model that MuJoCo can read: {reason}.") from None
-    try:
-        return built_hand(RestingModel(mujoco, compiled, described), str(model))
-    except UnicodeDecodeError:
-        raise InputError(f"{str(model)!r} has names that are no UTF-8; save it as UTF-8.") from None
 
 
 def packaged_hand(config: str | Path) -> Hand:
