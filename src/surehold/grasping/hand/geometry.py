@@ -7,6 +7,7 @@ Geometries of the palm, and of what moves with it, become boxes with round edges
 """
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +16,21 @@ from surehold.errors import unknown_name
 from surehold.grasping.hand.cover import SHORTEST, Capsule, cover_box, cover_mesh
 from surehold.grasping.hand.rest import RestingModel
 
-__all__ = ["link_capsules", "palm_boxes"]
+__all__ = ["LinkPart", "link_parts", "palm_boxes"]
 
 Array = NDArray[np.float64]
 
 
-def link_capsules(rest: RestingModel, finger: str, k: int) -> Iterator[tuple[str, Array, Array, float]]:
-    """Yield name, ends (3,) in the palm frame and radius of the capsules that joint k of a finger moves."""
+class LinkPart(NamedTuple):
+    """A geometry of a finger, in the palm frame."""
+
+    body: str
+    capsules: list[Capsule]
+    box: tuple[Array, Array] | None  #: pose (3, 4) and half extents (3,) of one that is a box
+
+
+def link_parts(rest: RestingModel, finger: str, k: int) -> Iterator[LinkPart]:
+    """Yield the geometries that joint k of a finger moves."""
     allowed = rest.config.contact_links
     for name in allowed or []:
         if name not in rest.body_ids:
@@ -32,8 +41,10 @@ def link_capsules(rest: RestingModel, finger: str, k: int) -> Iterator[tuple[str
             continue
         for g in _geometries(rest, body):
             p, r = rest.placed(rest.data.geom_xpos[g], rest.data.geom_xmat[g].reshape(3, 3))
-            for near, far, radius in _cover(rest, g):
-                yield name, p + r @ near, p + r @ far, radius
+            capsules = [(p + r @ near, p + r @ far, radius) for near, far, radius in _cover(rest, g)]
+            center, half = _half(rest, g)
+            flat = rest.model.geom_type[g] == int(rest.mujoco.mjtGeom.mjGEOM_BOX)
+            yield LinkPart(name, capsules, (np.column_stack([r, p + r @ center]), half) if flat else None)
 
 
 def palm_boxes(rest: RestingModel) -> list[tuple[Array, Array, float]]:
