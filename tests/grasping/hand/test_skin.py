@@ -75,7 +75,7 @@ def test_a_pad_is_felt_where_the_model_has_it(tmp_path):
 
 
 def test_two_models_of_one_gripper_grasp_alike(tmp_path):
-    """Where pads were felt on the capsules inside them, the five boxes had 1.44 to 1.49 times the quality of the one."""
+    """Felt on the capsules inside the pads, the five boxes had 1.44 to 1.49 times the quality of the one."""
     qualities = []
     for pad in (ONE, FIVE):
         hand = gripper(tmp_path, pad)

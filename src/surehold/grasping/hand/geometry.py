@@ -3,7 +3,8 @@
 A capsule stays what it is; a sphere is a capsule of no length; a box, cylinder or ellipsoid is covered by parallel
 capsules whose radius is its smallest half extent, no farther apart than that radius (the hollows between them are at
 most 0.14 radius deep); a mesh is cut across its longest axis into pieces of at most 20 mm, each covered like a box.
-Geometries of the palm, and of what moves with it, become boxes with round edges.
+Geometries of the palm, and of what moves with it, become boxes with round edges: a mesh several, so that its openings
+stay open (filling.py).
 """
 
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import unknown_name
 from surehold.grasping.hand.cover import SHORTEST, Capsule, cover_box, cover_mesh
+from surehold.grasping.hand.filling import filling_boxes
 from surehold.grasping.hand.rest import RestingModel
 
 __all__ = ["LinkPart", "link_parts", "palm_boxes"]
@@ -53,12 +55,14 @@ def palm_boxes(rest: RestingModel) -> list[tuple[Array, Array, float]]:
     types = rest.mujoco.mjtGeom
     for body in rest.of_palm:
         for g in _geometries(rest, body):
-            center, half = _half(rest, g)
             p, r = rest.placed(rest.data.geom_xpos[g], rest.data.geom_xmat[g].reshape(3, 3))
-            smallest = float(half.min())
-            round_body = rest.model.geom_type[g] in (int(types.mjGEOM_SPHERE), int(types.mjGEOM_CAPSULE))
-            rounding = smallest * (1.0 - 1e-6) if round_body else min(0.003, 0.5 * smallest)
-            boxes.append((np.column_stack([r, p + r @ center]), half, rounding))
+            kind = rest.model.geom_type[g]
+            turn, filled = _filled(rest, g) if kind == int(types.mjGEOM_MESH) else (np.eye(3), [_half(rest, g)])
+            for center, half in filled:
+                smallest = float(half.min())
+                round_body = kind in (int(types.mjGEOM_SPHERE), int(types.mjGEOM_CAPSULE))
+                rounding = smallest * (1.0 - 1e-6) if round_body else min(0.003, 0.5 * smallest)
+                boxes.append((np.column_stack([r @ turn, p + r @ turn @ center]), half, rounding))
     return boxes
 
 
@@ -87,7 +91,24 @@ def _cover(rest: RestingModel, g: int) -> list[Capsule]:
     center, half = _half(rest, g)
     if kind != int(types.mjGEOM_MESH):
         return cover_box(center, half)
+    return cover_mesh(*_mesh(rest, g))
+
+
+def _mesh(rest: RestingModel, g: int) -> tuple[Array, NDArray[np.integer]]:
+    """Return vertices (v, 3) and faces (f, 3) of a geometry that is a mesh, in its own frame."""
     mesh = int(rest.model.geom_dataid[g])
     vertices = rest.model.mesh_vert[rest.model.mesh_vertadr[mesh] :][: rest.model.mesh_vertnum[mesh]]
     faces = rest.model.mesh_face[rest.model.mesh_faceadr[mesh] :][: rest.model.mesh_facenum[mesh]]
-    return cover_mesh(np.asarray(vertices, dtype=np.float64), np.asarray(faces))
+    return np.asarray(vertices, dtype=np.float64), np.asarray(faces)
+
+
+def _filled(rest: RestingModel, g: int) -> tuple[Array, list[tuple[Array, Array]]]:
+    """Return axes (3, 3) and boxes along them that fill a mesh: its own axes of inertia, or those of its file.
+
+    The smaller box around all of it decides between the two.
+    """
+    vertices, faces = _mesh(rest, g)
+    of_file = np.empty(9)
+    rest.mujoco.mju_quat2Mat(of_file, rest.model.mesh_quat[int(rest.model.geom_dataid[g])])
+    turn = min((np.eye(3), of_file.reshape(3, 3).T), key=lambda axes: float(np.prod(np.ptp(vertices @ axes, axis=0))))
+    return turn, filling_boxes(vertices @ turn, faces)
