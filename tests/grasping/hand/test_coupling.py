@@ -185,6 +185,17 @@ def test_a_loop_that_cannot_be_closed(tmp_path, fingers, closed, words):
         assert word in str(error.value)
 
 
+@pytest.mark.parametrize(("factor", "limits", "expected"), [(-1, (0, 1), (-2, 0)), (0.5, (0, 1), (0, 1))])
+def test_a_follower_moves_although_its_limits_lost_their_sign(tmp_path, factor, limits, expected):
+    text = HINGES.format(more=f'<equality><joint joint1="d1" joint2="c1" polycoef="0 {factor}"/></equality>')
+    text = text.replace('name="c1"', 'name="c1" range="0 2"')
+    text = text.replace('axis="0 -1 0"', f'axis="0 -1 0" range="{limits[0]} {limits[1]}"')
+    hand = hand_of(tmp_path, text, FINGERS, {"c1": 1.6})
+    d1 = hand.joint_names.index("d1")
+    assert (hand.lower.ravel()[d1], hand.upper.ravel()[d1]) == pytest.approx(expected)
+    assert angles(hand)["d1"] == pytest.approx(1.6 * factor)
+
+
 def test_two_joints_that_follow_each_other(tmp_path):
     text = HINGES.format(more='<equality><joint joint1="b1" joint2="c1"/><joint joint1="c1" joint2="b1"/></equality>')
     hand = hand_of(tmp_path, text, FINGERS, {"b1": 1.0, "d1": 1.0})

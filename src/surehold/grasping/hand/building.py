@@ -30,7 +30,7 @@ class _Finger(NamedTuple):
 
 def built_hand(rest: RestingModel, file: str) -> Hand:
     """Return the hand of a model at rest, read from `file`."""
-    config = rest.config
+    config, couplings = rest.config, JointCouplings(rest)
     rows = [_finger(rest, finger, joints) for finger, joints in rest.fingers.items()]
     _check_size(rest, rows)
     longest = max(len(row.chain) for row in rows)
@@ -46,10 +46,10 @@ def built_hand(rest: RestingModel, file: str) -> Hand:
         for k, j in enumerate(row.joints):
             if j is not None:
                 names[i][k] = rest.joint_names[j]
-                lower[i, k], upper[i, k] = rest.range(j)
+                lower[i, k], upper[i, k] = couplings.range(j)
         links[i][:n] = row.links
     boxes = palm_boxes(rest)
-    flat, couplings = tuple(name for row in names for name in row), JointCouplings(rest)
+    flat = tuple(name for row in names for name in row)
     return Hand(
         name=config.name,
         bases=np.stack([row.base for row in rows]),
