@@ -3,6 +3,7 @@
 import copy
 import importlib.util
 import os
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -11,7 +12,7 @@ import yaml
 
 from surehold.errors import InputError
 from surehold.grasping import GraspChecker, Simulator, default_pose, hand_named
-from surehold.grasping.hand.configuration import HandConfig
+from surehold.grasping.hand.configuration import HandConfig, read_hand_config
 from surehold.grasping.hand.cover import cover_box, cover_mesh
 from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.kinematics import link_ends
@@ -296,3 +297,18 @@ def test_a_pipe_is_no_model(tmp_path):
         load_hand(tmp_path / "hand.xml", HandConfig.model_validate(CONFIG))
     with pytest.raises(InputError, match="is no regular file"):
         load_hand(tmp_path / "hand.xml", tmp_path / "hand.yaml")
+
+
+EXAMPLES = sorted((Path(__file__).parents[3] / "examples" / "hands").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_a_shipped_description_closes_every_finger(path):
+    """Without the models, which are their makers': each finger has a joint that closes or that the model may couple."""
+    described = read_hand_config(path)
+    assert described.name == path.stem
+    for preshape in described.preshapes.values():
+        known = {joint for joints in described.fingers.values() for joint in joints}
+        assert set(preshape.open) | set(preshape.closed) <= known
+        assert set(preshape.closed) - set(described.coupling) == set(preshape.closed)
+    assert len(EXAMPLES) >= 7
