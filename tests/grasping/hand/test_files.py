@@ -312,3 +312,37 @@ def test_a_shipped_description_closes_every_finger(path):
         assert set(preshape.open) | set(preshape.closed) <= known
         assert set(preshape.closed) - set(described.coupling) == set(preshape.closed)
     assert len(EXAMPLES) >= 7
+
+
+def test_default_classes_are_resolved(tmp_path):
+    """Ranges and axes of a class, geometries that are only looked at: the same hand as written out."""
+    joint, geom = 'axis="0 1 0" range="0 90"', 'type="capsule" fromto="0 0 .01 0 0 .04" size=".008"'
+    body = '<body pos="{x} 0 0"><joint name="{name}" {joint}/><geom {geom}/>{more}</body>'
+    model = (
+        '<mujoco>{defaults}<worldbody><body name="palm" {child}><geom {box}/>{left}{right}</body></worldbody></mujoco>'
+    )
+    box = 'type="box" size=".02 .04 .01"'
+    hands = []
+    for classes in (False, True):
+        looks = '<geom class="looks"/>' if classes else ""
+        parts = [
+            body.format(x=x, name=name, joint="" if classes else joint, geom="" if classes else geom, more=looks)
+            for x, name in ((-0.03, "a1"), (0.03, "c1"))
+        ]
+        defaults = (
+            f'<default><default class="hand"><joint {joint}/><geom {geom}/>'
+            '<default class="looks"><geom contype="0" conaffinity="0"/></default></default></default>'
+        )
+        text = model.format(
+            defaults=defaults if classes else "",
+            child='childclass="hand"' if classes else "",
+            box=f'class="main" {box}' if classes else box,
+            left=parts[0],
+            right=parts[1],
+        )
+        (tmp_path / "hand.xml").write_text(text)
+        config = described(
+            tmp_path, fingers__left=["a1"], coupling={}, preshapes__close={"closed": {"a1": 1.0, "c1": 1.0}}
+        )
+        hands.append(load_hand(tmp_path / "hand.xml", config))
+    assert all(np.array_equal(a, b) for a, b in zip(*(hand.arrays() for hand in hands), strict=True))
