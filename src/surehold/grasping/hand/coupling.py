@@ -68,21 +68,6 @@ class JointCouplings:
             leaders |= {j for j in range(self._model.njnt) if self._rest.moves(j)}
         return {self._rest.joint_names[j] for j in leaders}
 
-    def range(self, j: int) -> tuple[float, float]:
-        """Return the ends of a joint's range; of a follower that its leader never takes there, where it takes it.
-
-        Public models have mimicking joints that turn the other way than their limits say.
-        """
-        low, high = self._rest.range(j)
-        leader = self._described.get(j) or self._equal.get(j)
-        if leader is None or leader.joint < 0:
-            return low, high
-        away = np.linspace(*self._rest.range(leader.joint), 33) - leader.references[1]
-        taken = leader.references[0] + np.polynomial.polynomial.polyval(away, leader.polynomial)
-        first, last = float(taken.min()), float(taken.max())
-        meets = min(last, high) - max(first, low) > 0.1 * (last - first)
-        return (low, high) if meets else (first, last)
-
     def posture(self, named: Mapping[str, float], start: Array, what: str) -> Array:
         """Return all joints (j,): those named, those that follow them, the others where they `start` (j,).
 
@@ -108,6 +93,21 @@ class JointCouplings:
         if self._loops:
             self._close_loops(q, done, what)
         return q
+
+    def range(self, j: int) -> tuple[float, float]:
+        """Return the ends of a joint's range; of a follower that its leader never takes there, where it takes it.
+
+        Public models have mimicking joints that turn the other way than their limits say.
+        """
+        low, high = self._rest.range(j)
+        leader = self._described.get(j) or self._equal.get(j)
+        if leader is None or leader.joint < 0:
+            return low, high
+        away = np.linspace(*self._rest.range(leader.joint), 33) - leader.references[1]
+        taken = leader.references[0] + np.polynomial.polynomial.polyval(away, leader.polynomial)
+        first, last = float(taken.min()), float(taken.max())
+        meets = min(last, high) - max(first, low) > 0.1 * (last - first)
+        return (low, high) if meets else (first, last)
 
     def _number(self, name: str) -> int:
         if name not in self._rest.joint_ids:
