@@ -10,7 +10,7 @@
     fingers:                       # joints from the palm to the tip: the order in which they close
       index: [index_1, index_2, index_3]
       thumb: [thumb_1, thumb_2]
-    coupling:                      # optional: joints that follow others, q = factor * leader + offset
+    coupling:                      # optional: q = factor * leader + offset, beside what the model couples (coupling.py)
       index_3: {follows: index_2, factor: 0.8}
     contact_links: [index_tip]     # optional: only these bodies of the fingers can touch; all of them otherwise
     finger_force: 8                # optional: what a stretched finger can exert at its tip [N]
