@@ -26,7 +26,7 @@ from surehold.grasping.hand.configuration import HandConfig, PreshapeConfig, rea
 from surehold.grasping.hand.cover import SHORTEST, Capsule, cover_box, cover_mesh
 from surehold.grasping.hand.model import CLOSED, Hand, HandModel, Preshape, chain_row
 
-__all__ = ["load_hand", "packaged_hand"]
+__all__ = ["load_hand", "packaged_hand", "read_model"]
 
 Array = NDArray[np.float64]
 _MOST_BYTES: Final = 64 * 2**20
@@ -40,14 +40,29 @@ def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
     Raises
     ------
     InputError
-        If MuJoCo is not installed, a file cannot be read, or the description does not fit the model: the message
-        lists what the model has.
+        As `read_model`, or if the description does not fit the model: the message lists what the model has.
+    """
+    described = config if isinstance(config, HandConfig) else read_hand_config(config)
+    mujoco, compiled = read_model(model)
+    try:
+        builder = _Builder(mujoco, compiled, described)
+        return replace(builder.hand(), model=builder.source(str(model)))
+    except UnicodeDecodeError:
+        raise InputError(f"{str(model)!r} has names that are no UTF-8; save it as UTF-8.") from None
+
+
+def read_model(model: str | Path) -> tuple[Any, Any]:
+    """Return MuJoCo and the compiled model of a file (.xml of MuJoCo or .urdf).
+
+    Raises
+    ------
+    InputError
+        If MuJoCo is not installed, or the file cannot be read.
     """
     try:
         mujoco: Any = importlib.import_module("mujoco")  # its names are not in its type information
     except ImportError:
         raise InputError("reading a hand needs MuJoCo; install it with: pip install 'surehold[mujoco]'.") from None
-    described = config if isinstance(config, HandConfig) else read_hand_config(config)
     path = Path(model)
     if path.suffix.lower() not in (".xml", ".urdf", ".mjcf"):
         raise InputError(f"{str(model)!r} is no model of a hand; give an .xml (MJCF) or .urdf file.")
@@ -57,17 +72,12 @@ def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
             raise InputError(f"{str(model)!r} is no regular file; give a model on disk.")
         if status.st_size > _MOST_BYTES:
             raise InputError(f"{str(model)!r} is larger than 64 MB; give a model of the hand alone.")
-        compiled = _compiled(mujoco, path)
+        return mujoco, _compiled(mujoco, path)
     except OSError as error:
         raise InputError(f"cannot read {str(model)!r}: {error.strerror}.") from None
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())[:160]
         raise InputError(f"{str(model)!r} is not a model that MuJoCo can read: {reason}.") from None
-    try:
-        builder = _Builder(mujoco, compiled, described)
-        return replace(builder.hand(), model=builder.source(str(model)))
-    except UnicodeDecodeError:
-        raise InputError(f"{str(model)!r} has names that are no UTF-8; save it as UTF-8.") from None
 
 
 def packaged_hand(config: str | Path) -> Hand:
