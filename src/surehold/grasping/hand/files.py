@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.hand.configuration import HandConfig, PreshapeConfig, read_hand_config
+from surehold.grasping.hand.configuration import HandConfig, ModelFile, PreshapeConfig, read_hand_config
 from surehold.grasping.hand.cover import SHORTEST, Capsule, cover_box, cover_mesh
 from surehold.grasping.hand.model import CLOSED, Hand, HandModel, Preshape, chain_row
 
@@ -81,17 +81,19 @@ def read_model(model: str | Path) -> tuple[Any, Any]:
 
 
 def packaged_hand(config: str | Path) -> Hand:
-    """Return the hand of a description that names an installed package's model.
+    """Return the hand of a description that names its model: a file, or one of an installed package.
 
     Raises
     ------
     InputError
-        If the package is not installed; nothing is ever downloaded.
+        As `load_hand`, or if the package is not installed; nothing is ever downloaded.
     """
     described = read_hand_config(config)
     where = described.model
     if where is None:
         raise InputError(f"{str(config)!r} does not say where its model is; give --hand MODEL beside --hand-config.")
+    if isinstance(where, ModelFile):
+        return load_hand(Path(config).parent / where.file, described)
     found = importlib.util.find_spec(where.package)
     folders = [] if found is None else list(found.submodule_search_locations or [])
     for folder in folders:

@@ -109,7 +109,7 @@ class _Tree:
         if len(moving) > _MOST_JOINTS or longest > _MOST_CHAIN or len(fingers) > _MOST_FINGERS:
             inside = self.names[palm] or "an unnamed body"
             raise InputError(
-                f"{len(moving)} joints in {len(fingers)} chains move below {inside}, up to {longest} in a chain; a hand "
+                f"{len(moving)} joints in {len(fingers)} chains move below {inside}, up to {longest} in one; a hand "
                 f"has up to {_MOST_JOINTS} in {_MOST_FINGERS} fingers of {_MOST_CHAIN}: name the palm with --palm BODY."
             )
         for j in moving:
@@ -152,7 +152,7 @@ class _Tree:
         for j in self.joints:
             path = self._above(self._body(j))
             above[j] = [i for i in self.joints if self._body(i) in path and (self._body(i) != self._body(j) or i <= j)]
-            above[j].sort(key=lambda i: (path.index(self._body(i)), i))  # noqa: B023
+            above[j].sort(key=lambda i: (path.index(self._body(i)), i))
         carriers: set[int] = set()  # joints that carry something that can touch beyond their own link
         leaves = {}
         for j in sorted(self.joints, key=lambda j: -len(above[j])):
@@ -235,7 +235,7 @@ class _Tree:
     def _named(self, fingers: Sequence[Sequence[int]]) -> dict[str, list[int]]:
         """Return the fingers by name: thumb, index, .. where the model's names say so."""
         found = []
-        for n, finger in enumerate(fingers):
+        for finger in fingers:
             bodies = [b for b in range(self.model.nbody) if self._is_below(b, self._body(finger[0]))]
             text = [name.lower() for name in (*map(self._label, finger), *(self.names[b] for b in bodies))]
             counts = {word: sum(bool(re.search(pattern, name)) for name in text) for word, pattern in _WORDS.items()}
