@@ -34,7 +34,16 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 from surehold.errors import InputError
 from surehold.grasping.plain_data import plain_yaml
 
-__all__ = ["Coupling", "HandConfig", "ModelFile", "PackagedModel", "PalmConfig", "Posture", "PreshapeConfig", "read_hand_config"]
+__all__ = [
+    "Coupling",
+    "HandConfig",
+    "ModelFile",
+    "PackagedModel",
+    "PalmConfig",
+    "Posture",
+    "PreshapeConfig",
+    "read_hand_config",
+]
 
 Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 Joints = dict[str, FiniteFloat]

@@ -29,12 +29,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import InputError
 from surehold.grasping.hand.configuration import HandConfig
 from surehold.grasping.hand.files import load_hand, read_model
-from surehold.grasping.hand.kinematics import link_frames
-from surehold.grasping.hand.model import Hand
 from surehold.grasping.hand.skeleton import Skeleton, skeleton_of
+from surehold.grasping.hand.tips import Fingertips
 
 __all__ = ["Proposal", "propose_hand"]
 
@@ -94,8 +92,8 @@ class _Proposer:
         self.hand = load_hand(model, HandConfig.model_validate({**self.base, "palm": palm, "preshapes": preshapes}))
         self.place = {name: divmod(i, self.hand.lower.shape[1]) for i, name in enumerate(self.hand.joint_names) if name}
         self.rest = np.clip(0.0, self.hand.lower, self.hand.upper)
-        self.slides = self.hand.chains[:, :, 0] > 0.0
-        self.tips_in_link = self._tips_in_link()
+        self.tips = Fingertips(self.hand)
+        self.slides = self.tips.slides
         self.length = float(np.mean(self._extents()))
 
     def posture(self, values: Mapping[str, float]) -> Array:
@@ -107,35 +105,9 @@ class _Proposer:
             q[self.place[follower]] = coupling.factor * q[self.place[coupling.follows]] + coupling.offset
         return np.clip(q, self.hand.lower, self.hand.upper)
 
-    def frames(self, q: Array) -> Array:
-        """Return the frames (f, j, 3, 4) of all joints."""
-        return link_frames(self.hand.bases, self.hand.chains, np.ascontiguousarray(q)).reshape(*q.shape, 3, 4)
-
-    def tips(self, q: Array) -> Array:
-        """Return the tips (f, 3)."""
-        last = self.frames(q)[:, -1]
-        return np.einsum("fij,fj->fi", last[:, :, :3], self.tips_in_link) + last[:, :, 3]
-
-    def _tips_in_link(self) -> Array:
-        """Return the tips (f, 3) in the frame of the last joint: the middle of the far ends of what it moves."""
-        tips = []
-        for f, chain in enumerate(self.hand.chains):
-            last = max(k for k in range(len(chain)) if self._named(f, k))
-            there = [k for k in range(last, len(chain)) if self.hand.radii[f, k] > 0.0]
-            ends = np.concatenate([chain[there, 1:4], chain[there, 4:7]])
-            far = np.linalg.norm(ends, axis=1)
-            along = ends @ (ends.mean(axis=0) / max(np.linalg.norm(ends.mean(axis=0)), 1e-9))
-            if not self.slides[f, last]:
-                along = far
-            tips.append(ends[along >= along.max() - 0.2 * np.ptp(along)].mean(axis=0))
-        return np.array(tips)
-
-    def _named(self, f: int, k: int) -> str:
-        return self.hand.joint_names[f * self.hand.lower.shape[1] + k]
-
     def _extents(self) -> Array:
         """Return the distances (f,) from the first joint of each finger to its tip at rest."""
-        return np.linalg.norm(self.tips(self.rest) - self.hand.bases[:, :, 3], axis=1)
+        return np.linalg.norm(self.tips.at(self.rest) - self.hand.bases[:, :, 3], axis=1)
 
     def _range(self, joint: str) -> tuple[float, float]:
         place = self.place[joint]
@@ -153,7 +125,7 @@ class _Proposer:
         rest = np.array([self.rest[self.place[joint]] for joint in self.leaders])
 
         def residuals(v: Array) -> Array:
-            tips = self.tips(self.posture(dict(zip(self.leaders, v, strict=True))))
+            tips = self.tips.at(self.posture(dict(zip(self.leaders, v, strict=True))))
             apart = (tips - tips.mean(axis=0)) / self.length
             return np.concatenate([apart.ravel(), _PULL * (v - rest) / (upper - lower)])
 
@@ -168,7 +140,7 @@ class _Proposer:
 
     def bending(self) -> list[dict[str, float]]:
         """Return the leading joints that bend or slide each finger, and in which sense with its last joint: +1, -1."""
-        frames, found = self.frames(self.posture({})), []
+        frames, found = self.tips.frames(self.posture({})), []
         for joints in self.skeleton.fingers.values():
             last = self.place[joints[-1]]
             chosen: dict[str, float] = {}
@@ -216,7 +188,7 @@ class _Proposer:
         """Return the tips (t, f, 3) on the way from one posture to another."""
         shares = np.linspace(0.0, 1.0, _STEPS)
         return np.stack(
-            [self.tips(self.posture({j: opened[j] + t * (closed[j] - opened[j]) for j in opened})) for t in shares]
+            [self.tips.at(self.posture({j: opened[j] + t * (closed[j] - opened[j]) for j in opened})) for t in shares]
         )
 
     def proposal(self) -> Proposal:
@@ -241,10 +213,10 @@ class _Proposer:
 
     def _directions(self, opened: Mapping[str, float], closed: Mapping[str, float]) -> tuple[Array, Array]:
         """Return d and m (f, 3)."""
-        start = self.tips(self.posture(opened))
+        start = self.tips.at(self.posture(opened))
         soon = {j: v + 0.15 * (closed.get(j, v) - v) for j, v in opened.items()}
-        moved = self.tips(self.posture(soon)) - start
-        frames = self.frames(self.posture(opened))
+        moved = self.tips.at(self.posture(soon)) - start
+        frames = self.tips.frames(self.posture(opened))
         along = []
         for f, joints in enumerate(self.skeleton.fingers.values()):
             first = next((j for j in joints if j in closed or j in self.skeleton.coupling), joints[0])
@@ -265,7 +237,7 @@ class _Proposer:
         bending: Sequence[Mapping[str, float]],
     ) -> Proposal:
         d, m = self._directions(opened, closed)
-        tips, bases = self.tips(self.posture(opened)), self.hand.bases[:, :, 3]
+        tips, bases = self.tips.at(self.posture(opened)), self.hand.bases[:, :, 3]
         fingers = list(self.skeleton.fingers)
         pair = [f for f in range(len(fingers)) if f != thumb]
         sliding = all(self.slides[self.place[j]] for j in closed)
