@@ -13,9 +13,9 @@ from surehold.reports.run_report import Candidate, Scene, SceneMesh
 __all__ = ["JOINT_COLUMNS", "joint_rows", "render_hand"]
 
 JOINT_COLUMNS = ("finger", "joint", "range", "open", "closed")
-_PALM, _LINK, _ROD, _CENTER = "#9aa3ad", "#c3bdb2", "#3f4a57", "#f0b400"
+_PALM, _LINK, _ROD, _CENTER = "#9aa3ad", "#c3bdb2", "#8e5bd0", "#f0b400"
 _AXES = {"x": "#d1383d", "y": "#2f9e44", "z": "#2b6fdb"}
-_VIEW = (0.75, -0.9, 0.75)
+_VIEW, _YAW = (0.0, -1.0, 0.7), np.radians(-40.0)  # from the front and above; the hands are turned about z
 
 
 def joint_rows(hand: Hand, preshape: str) -> list[tuple[str, ...]]:
@@ -38,7 +38,7 @@ def joint_rows(hand: Hand, preshape: str) -> list[tuple[str, ...]]:
 
 
 def render_hand(hand: Hand, facts: Sequence[tuple[str, str]], faults: Sequence[str]) -> str:
-    """Return the page as HTML text: each preshape open and closing, `facts` (name, value) and what looks wrong.
+    """Return the page as HTML text: the open hand beside the closing one, `facts` (name, value), and what looks wrong.
 
     Raises
     ------
@@ -49,14 +49,11 @@ def render_hand(hand: Hand, facts: Sequence[tuple[str, str]], faults: Sequence[s
 
     from surehold import __version__
 
-    views, notes = [], []
-    for name in hand.preshapes:
-        for opened in (True, False):
-            state = "open" if opened else "closed"
-            label = state if len(hand.preshapes) == 1 else f"{name}, {state}"
-            views.append(Candidate(label, np.empty(0), 0.0, scene=_scene(hand, name, opened)))
-            rest = "at rest before it closes" if opened else "the slider opens and closes it; here nothing stops it"
-            notes.append(f"{hand.name}, {name}: {rest}.")
+    views = [Candidate(name, np.empty(0), 0.0, scene=_scene(hand, name)) for name in hand.preshapes]
+    notes = [
+        f"{hand.name}, {name}: open on the left; on the right as the slider says, while nothing stops it."
+        for name in hand.preshapes
+    ]
     return (
         environment()
         .get_template("hand.html.j2")
@@ -71,24 +68,31 @@ def render_hand(hand: Hand, facts: Sequence[tuple[str, str]], faults: Sequence[s
             rod=_ROD,
             columns=JOINT_COLUMNS,
             tables={name: joint_rows(hand, name) for name in hand.preshapes},
-            **scene_context(views, notes, first=1),
+            **scene_context(views, notes, first=0),
         )
     )
 
 
-def _scene(hand: Hand, preshape: str, opened: bool) -> Scene:
-    drawn = hand_scene(hand, preshape, opened)
-    colored = [(mesh, _PALM if mesh.name == "palm" else _LINK) for mesh in drawn.bodies]
-    colored += [(mesh, _AXES[mesh.name]) for mesh in drawn.axes]
-    colored += [(mesh, _ROD) for mesh in drawn.joints]
-    colored.append((drawn.grasp_center, _CENTER))
-    bodies = len(drawn.bodies)
-    meshes = [
-        SceneMesh(mesh.name, mesh.vertices, mesh.faces, color, see_through=i < bodies, poses=mesh.poses)
-        for i, (mesh, color) in enumerate(colored)
-    ]
+def _scene(hand: Hand, preshape: str) -> Scene:
+    """Return the open hand on the left and the closing one on the right of the picture, each seen at an angle."""
+    opened, closing = hand_scene(hand, preshape, opened=True), hand_scene(hand, preshape)
+    turn = np.array([[np.cos(_YAW), -np.sin(_YAW), 0.0], [np.sin(_YAW), np.cos(_YAW), 0.0], [0.0, 0.0, 1.0]])
+    across = np.concatenate(
+        [mesh.vertices @ (turn[0] @ mesh.poses[0, :, :3]) + turn[0] @ mesh.poses[0, :, 3] for mesh in opened.bodies]
+    )
+    meshes = []
+    for drawn, side in ((opened, -0.5), (closing, 0.5)):
+        shift = np.array([1.2 * side * float(np.ptp(across)), 0.0, 0.0])
+        colored = [(mesh, _PALM if mesh.name == "palm" else _LINK) for mesh in drawn.bodies]
+        colored += [(mesh, _AXES[mesh.name]) for mesh in drawn.axes]
+        colored += [(mesh, _ROD) for mesh in drawn.joints]
+        colored.append((drawn.grasp_center, _CENTER))
+        for mesh, color in colored:
+            poses = turn @ mesh.poses
+            poses[:, :, 3] += shift
+            meshes.append(SceneMesh(mesh.name, mesh.vertices, mesh.faces, color, mesh.name == "palm", poses))
     return Scene(tuple(meshes), view=_VIEW)
 
 
 def _value(value: float, slides: bool) -> str:
-    return f"{1e3 * value:.1f}" if slides else f"{value + 0.0:.2f}"
+    return f"{round(1e3 * value, 1) + 0.0:.1f}" if slides else f"{round(value, 2) + 0.0:.2f}"

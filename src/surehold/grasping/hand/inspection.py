@@ -39,8 +39,8 @@ def finger_motions(hand: Hand, preshape: str | None = None) -> list[FingerMotion
 def hand_faults(hand: Hand, preshape: str | None = None) -> list[str]:
     """Return what looks wrong with a hand, a sentence each, in a preshape or, if none is named, in all of them.
 
-    - The fingertips close behind the palm: on their way they are, on average, below the middle of the palm's boxes, seen
-      along the palm's z.
+    - The fingertips close behind the palm: on their way they are, on average, below the middle of the palm's boxes,
+      seen along the palm's z.
     - Open and closed are exchanged: the tips that move are nearest to each other when the hand is open, and at least
       2 mm farther apart when it is closed.
     - A finger never moves: its tip stays within 1 mm in every preshape of the hand.
