@@ -36,6 +36,7 @@ class Skeleton(NamedTuple):
 
     palm: str  #: body
     fingers: Mapping[str, tuple[str, ...]]  #: joints of each finger, from the palm to the tip
+    ranges: Mapping[str, tuple[float, float]]  #: of the joints of fingers [rad or m]; a whole turn, or 1 m, if free
     coupling: Mapping[str, Coupling]  #: joints of fingers that follow others
     resting: tuple[str, ...]  #: joints below the palm that no finger has
 
@@ -71,8 +72,7 @@ class _Tree:
         ]
         self.data = mujoco.MjData(model)
         for j in self.joints:
-            rest = np.clip(0.0, *model.jnt_range[j]) if model.jnt_limited[j] else 0.0
-            self.data.qpos[model.jnt_qposadr[j]] = rest
+            self.data.qpos[model.jnt_qposadr[j]] = np.clip(0.0, *self._range(j))
         mujoco.mj_kinematics(model, self.data)
 
     def skeleton(self) -> Skeleton:
@@ -100,6 +100,7 @@ class _Tree:
         return Skeleton(
             self._name_of(palm),
             {name: tuple(self._label(j) for j in finger) for name, finger in named.items()},
+            {self._label(j): self._range(j) for j in moving},
             self._coupling(moving),
             tuple(self._label(j) for j in below if j not in moving),
         )
@@ -126,6 +127,11 @@ class _Tree:
 
     def _label(self, j: int) -> str:
         return self.model.joint(j).name
+
+    def _range(self, j: int) -> tuple[float, float]:
+        if not self.model.jnt_limited[j]:
+            return (-np.pi, np.pi) if self.model.jnt_type[j] == self.hinge else (-1.0, 1.0)
+        return float(self.model.jnt_range[j][0]), float(self.model.jnt_range[j][1])
 
     def _body(self, j: int) -> int:
         return int(self.model.jnt_bodyid[j])
