@@ -12,7 +12,8 @@
 2. *Closing directions.* Several joints that have room in one sense only close in that. Of all combinations of the other
    fingers' senses the one is taken on whose way the tips come nearest to their common middle, of equal ones that which
    brings them there from farther away. Closed is the end of the range (of a joint without limits 90 degrees or 50 mm
-   on), open is rest, or the other end where a finger slides, has one joint, or rests where it is closed.
+   on), open is rest, or the other end where a finger slides, has one joint, or rests where it is closed. A gripper of
+   several joints opens up to 30 degrees wider.
 3. *Opposed finger.* The one without which d and m of the others agree best.
 4. *Palm frame.* Where the fingers stand apart in the direction in which they close, as in a gripper, the palm's front
    is where they point and start to: z = d + m of both sides, and x = s; where they slide, z leads from the palm to the
@@ -81,6 +82,8 @@ def propose_hand(model: str | Path, palm: str = "") -> Proposal:
     opposed = _opposed(*_directions(hand, opened, closed))
     opened = {**others[opposed], **opened}
     x, z, center, gripper = _palm_frame(hand, opened, closed, opposed)
+    if gripper:
+        opened = hand.widened(bending, opened, closed)
     names = list(skeleton.fingers)
     if not gripper and names[opposed].startswith("finger_") and "thumb" not in names:
         names[opposed] = "thumb"
@@ -150,8 +153,9 @@ def _palm_frame(
     turn = np.column_stack([x, np.cross(z, x), z])
     front = _front_of_palm(hand, z)
     if gripper:
-        middle = 0.5 * (way[:, rest].mean(axis=1) + way[:, opposed]) @ turn
-        return x, z, np.array([*middle[0, :2], front + 0.65 * (middle[:, 2].max() - front)]), True
+        middle = way.mean(axis=1) @ turn
+        meet = int(np.linalg.norm(way - way.mean(axis=1, keepdims=True), axis=2).mean(axis=1).argmin())
+        return x, z, np.array([*middle[meet, :2], front + 0.65 * (middle[:, 2].max() - front)]), True
     return x, z, np.array([*(bases[rest].mean(axis=0) @ turn)[:2], front + 0.33 * hand.length]), False
 
 

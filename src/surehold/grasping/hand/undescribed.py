@@ -20,6 +20,7 @@ _PARALLEL: Final = np.cos(np.radians(40.0))
 _PULL: Final = 0.03  # of rest on the meeting posture: a whole range weighs as much as 3 % of a finger's length
 _STEPS: Final = 9  # postures on the way from open to closed
 _NEAR: Final = 0.02  # of a finger's length: differences below do not tell which tips come nearer to each other
+_WIDER: Final = np.radians(30.0)
 _FREE: Final = (0.5 * np.pi, 0.05)  # motion each way of a joint without limits that turns [rad], that slides [m]
 
 
@@ -115,6 +116,15 @@ class UndescribedHand:
             nearest = round(float(apart.min()) / (_NEAR * self.length))
             found.append((nearest, round(float(apart.min() - apart[0]), 9), opened, closed))
         return min(found, key=lambda one: one[:2])[2:]
+
+    def widened(self, bending: list[dict[str, float]], opened: Values, closed: Values) -> dict[str, float]:
+        """Return open values at which the first joint that bends each finger is up to 30 degrees wider than at rest."""
+        wider = dict(opened)
+        for joint in (next(iter(group)) for group in bending if group):
+            if not self._alone(joint):
+                outwards = np.sign(opened[joint] - closed[joint])
+                wider[joint] = float(np.clip(opened[joint] + _WIDER * outwards, *self.skeleton.ranges[joint]))
+        return wider
 
     def _ends(self, joints: Mapping[str, float], sense: int) -> tuple[dict[str, float], dict[str, float]]:
         """Return open and closed values of the joints that bend a finger, if its last one closes in a sense."""
