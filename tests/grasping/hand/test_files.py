@@ -174,7 +174,7 @@ def test_only_contact_links_touch(tmp_path, model):
         ({"preshapes__close__posture": {"range": [1, -1], "joints": {"a1": 1}}}, ("the smaller one first",)),
         ({"preshapes__close__posture": {"range": [-1, 1], "joints": {"zz": 1}}}, ("close.posture 'zz'",)),
         ({"coupling": {"zz": {"follows": "a1"}}}, ("joint of coupling 'zz'",)),
-        ({"coupling": {"b1": {"follows": "b1"}}}, ("which follows too",)),
+        ({"coupling": {"b1": {"follows": "b1"}}}, ("follows itself",)),
         ({"contact_links": ["zz"]}, ("body 'zz' is unknown",)),
         ({"contact_links": []}, ("no geometry that can touch",)),
     ],
