@@ -1,4 +1,4 @@
-"""Small models of hands, written here: a five-fingered one that can stand in any frame, grippers, a linkage."""
+"""Small models of hands: a five-fingered one that can stand in any frame, three fingers, grippers, a linkage."""
 
 import numpy as np
 
@@ -21,34 +21,29 @@ TURNING = """
   <joint name="a" type="revolute"><parent link="palm"/><child link="l"/><origin xyz="-.04 0 .01"/>
     <axis xyz="0 1 0"/><limit lower="-.2" upper="1.2" effort="1" velocity="1"/></joint>
   <joint name="b" type="revolute"><parent link="palm"/><child link="r"/><origin xyz=".04 0 .01"/>
-    <axis xyz="0 1 0"/><limit lower="-1.2" upper=".2" effort="1" velocity="1"/><mimic joint="a" multiplier="-1"/></joint>
+    <axis xyz="0 1 0"/><limit lower="-1.2" upper=".2" effort="1" velocity="1"/>
+    <mimic joint="a" multiplier="-1"/></joint>
 </robot>
 """
-#: Four bars on each side: the bar "drive" bends, "inner" is parallel to it, and a pad hangs on "inner".
-LINKAGE = """
-<mujoco><compiler angle="radian"/><worldbody><body name="base"><geom type="box" size=".04 .02 .02" pos="0 0 -.02"/>
-  {}{}
+_LINKAGE = """
+<mujoco><compiler angle="radian"/><worldbody><body name="base"><geom type="box" size=".04 .02 .02" pos="0 0 -.02"/>{}
 </body></worldbody><equality>
-  <connect body1="coupler_l" body2="pad_l" anchor="0 0 .005"/><connect body1="coupler_r" body2="pad_r" anchor="0 0 .005"/>
-</equality></mujoco>
+  <connect body1="drive_l" body2="pad_l" anchor="0 0 .05"/><connect body1="drive_r" body2="pad_r" anchor="0 0 .05"/>
+  <joint joint1="drive_r" joint2="drive_l" polycoef="0 1 0 0 0"/>
+</equality><actuator><position joint="drive_l"/></actuator></mujoco>
 """
 _SIDE = """
-  <body name="drive_{s}" pos="{x} 0 0"><joint name="drive_{s}" axis="0 {a} 0" range="0 .8"/>
-    <geom type="capsule" fromto="0 0 .01 0 0 .04" size=".005"/>
-    <body name="coupler_{s}" pos="0 0 .05"><joint name="coupler_{s}" axis="0 {a} 0" range="-1 1"/>
-      <geom type="capsule" fromto="0 0 0 0 0 .005" size=".005"/></body></body>
-  <body name="inner_{s}" pos="{y} 0 .01"><joint name="inner_{s}" axis="0 {a} 0" range="0 .8"/>
+  <body name="drive_{s}" pos="{x} 0 0"><joint name="drive_{s}" axis="0 {a} 0" range="0 .5"/>
+    <geom type="capsule" fromto="0 0 .01 0 0 .05" size=".005"/></body>
+  <body name="inner_{s}" pos="{y} 0 .01"><joint name="inner_{s}" axis="0 {a} 0" range="0 .5"/>
     <geom type="capsule" fromto="0 0 .01 0 0 .04" size=".004"/>
-    <body name="pad_{s}" pos="0 0 .05"><joint name="pad_{s}" axis="0 {a} 0" range="-.8 .1"/>
-      <geom type="box" size=".004 .012 .025" pos="0 0 .025"/></body></body>
-"""
+    <body name="pad_{s}" pos="0 0 .05"><joint name="pad_{s}" axis="0 {a} 0" range="-.9 .1"/>
+      <geom type="box" size=".004 .012 .025" pos="0 0 .025"/></body></body>"""
 
 
 def linkage() -> str:
-    """Return MJCF of a gripper of two linkages, whose pads are tied to the bars that drive them."""
-    return LINKAGE.format(
-        _SIDE.format(s="l", x=-0.035, y=-0.02, a=1), _SIDE.format(s="r", x=0.035, y=0.02, a=-1)
-    )
+    """Return MJCF of a gripper of two parallelograms: one bar is driven, the other carries the pad, both hold it."""
+    return _LINKAGE.format(_SIDE.format(s="l", x=-0.065, y=-0.05, a=1) + _SIDE.format(s="r", x=0.065, y=0.05, a=-1))
 
 
 def three_fingers(spread: float = 120.0) -> str:
@@ -108,7 +103,8 @@ def five_fingers(turn=None, mirrored=False, palm="palm", before="", after="", wo
     named = f'name="{palm}"' if palm else ""
     return f"""<mujoco>
 <default><default class="skin"><geom type="capsule"/></default><default class="bend"><joint range="0 90"/></default>
-  <default class="spread"><joint range="-20 20"/></default><default class="swing"><joint range="0 110"/></default></default>
+  <default class="spread"><joint range="-20 20"/></default>
+  <default class="swing"><joint range="0 110"/></default></default>
 <worldbody>{before}<body {named}>
   <geom type="box" size=".04 .04 .012" pos="{v(0.045, 0, -0.006)}"
     xyaxes="{x[0]} {x[1]} {x[2]} {y[0]} {y[1]} {y[2]}"/>{fingers}

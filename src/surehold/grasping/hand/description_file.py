@@ -31,13 +31,9 @@ def description_text(proposal: Proposal, model: str) -> str:
         lines.append(f"  {_text(finger)}: [{', '.join(map(_text, joints))}]{opposed}")
     if proposal.resting:
         lines.append(f"# joints that stay at rest: {', '.join(proposal.resting)}")
-    if config.coupling:
-        lines.append("coupling:  # of the model: q = factor * leader + offset")
-        for joint, coupling in config.coupling.items():
-            offset = f", offset: {coupling.offset:.6g}" if coupling.offset else ""
-            lines.append(
-                f"  {_text(joint)}: {{follows: {_text(coupling.follows)}, factor: {coupling.factor:.6g}{offset}}}"
-            )
+    followers = [f"{joint} {role}" for joint, role in proposal.roles.items() if role.startswith("follows ")]
+    if followers:
+        lines.append(f"# by the model: {', '.join(followers)}")
     lines += [
         "# finger_force: 8  # what a stretched finger can exert at its tip [N]: of the maker's data sheet",
         "# friction: 0.6    # coefficient of its skin on objects; the object's own otherwise",

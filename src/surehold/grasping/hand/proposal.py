@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from surehold.grasping.hand.configuration import HandConfig
 from surehold.grasping.hand.files import read_model
-from surehold.grasping.hand.skeleton import Skeleton, skeleton_of
+from surehold.grasping.hand.skeleton import skeleton_of
 from surehold.grasping.hand.undescribed import UndescribedHand
 
 __all__ = ["Proposal", "propose_hand"]
@@ -48,8 +48,9 @@ class Proposal(NamedTuple):
     """A description, and what it was made of."""
 
     config: HandConfig
-    ranges: Mapping[str, tuple[float, float]]  #: of every joint of a finger [rad or m]
-    roles: Mapping[str, str]  #: of every joint of a finger: "bends", "slides", "spreads", "opposes" or "follows .."
+    ranges: Mapping[str, tuple[float, float]]  #: of the joints that have roles [rad or m]
+    #: of every joint of a finger: "bends", "slides", "spreads", "opposes", "follows .." or "rests"; of others "drives"
+    roles: Mapping[str, str]
     opposed: str  #: the finger that the others close against
     gripper: bool  #: whether the fingers stand apart in the direction in which they close
     resting: tuple[str, ...]  #: joints below the palm that no finger has
@@ -67,15 +68,10 @@ def propose_hand(model: str | Path, palm: str = "") -> Proposal:
     """
     mujoco, compiled = read_model(model)
     skeleton = skeleton_of(mujoco, compiled, str(model), palm)
-    parts = {
-        "name": Path(model).stem[:_LONGEST_NAME],
-        "fingers": {finger: list(joints) for finger, joints in skeleton.fingers.items()},
-        "coupling": {joint: coupling.model_dump() for joint, coupling in skeleton.coupling.items()},
-    }
-    hand = UndescribedHand(str(model), skeleton, parts)
+    hand = UndescribedHand(str(model), mujoco, compiled, skeleton)
     meeting, bending = hand.meeting(), hand.bending()
     others = [
-        {j: _rounded_within(meeting[j], skeleton.ranges[j]) for j in joints if j in meeting and not _any(j, bending)}
+        {j: _rounded_within(meeting[j], hand.ranges[j]) for j in joints if j in meeting and not _any(j, bending)}
         for joints in skeleton.fingers.values()
     ]
     opened, closed = hand.closing(bending, {j: v for group in others for j, v in group.items()})
@@ -90,24 +86,20 @@ def propose_hand(model: str | Path, palm: str = "") -> Proposal:
     moved = {j: round(v, 4) for j, v in opened.items() if abs(v - hand.at_rest(j)) > 1e-4}
     preshape = {"open": moved, "closed": {j: round(v, 4) for j, v in closed.items()}}
     description = {
-        **parts,
-        "fingers": dict(zip(names, parts["fingers"].values(), strict=True)),
+        "name": Path(model).stem[:_LONGEST_NAME],
         "palm": {
             "body": skeleton.palm,
             "x": _rounded(x, 4),
             "z": _rounded(z, 4),
             "grasp_center": _rounded(center, 3),
         },
+        "fingers": {name: list(joints) for name, joints in zip(names, skeleton.fingers.values(), strict=True)},
         "preshapes": {"pinch" if gripper and len(names) == 2 else "power": preshape},
     }
-    return Proposal(
-        HandConfig.model_validate(description),
-        skeleton.ranges,
-        _roles(hand, skeleton, bending, opposed),
-        names[opposed],
-        gripper,
-        skeleton.resting,
-    )
+    roles = _roles(hand, bending, opposed)
+    resting = tuple(joint for joint in skeleton.others if joint not in roles)
+    ranges = {joint: hand.ranges[joint] for joint in roles}
+    return Proposal(HandConfig.model_validate(description), ranges, roles, names[opposed], gripper, resting)
 
 
 def _any(joint: str, groups: Sequence[Mapping[str, float]]) -> bool:
@@ -121,7 +113,7 @@ def _directions(hand: UndescribedHand, opened: Mapping[str, float], closed: Mapp
     soon = {j: v + _START * (closed.get(j, v) - v) for j, v in opened.items()}
     bases = []
     for joints in hand.skeleton.fingers.values():
-        first = next((j for j in joints if j in closed or j in hand.skeleton.coupling), joints[0])
+        first = next((j for j in joints if hand.leader_of(j) in closed), joints[0])
         bases.append(frames[hand.place[first]][:, 3])
     return _unit(tips - np.array(bases)), _unit(hand.tips.at(hand.posture(soon)) - tips)
 
@@ -139,7 +131,7 @@ def _palm_frame(
     d, m = _directions(hand, opened, closed)
     way, bases = hand.way(opened, closed), hand.hand.bases[:, :, 3]
     rest = [f for f in range(len(d)) if f != opposed]
-    sliding = all(hand.slides[hand.place[j]] for j in closed)
+    sliding = all(j in hand.place and hand.slides[hand.place[j]] for j in closed)
     stand = way[0] if sliding else bases
     s = _unit(stand[rest].mean(axis=0) - stand[opposed])
     along, bent = _unit(d[rest].mean(axis=0)), _unit(m[rest].mean(axis=0))
@@ -174,14 +166,13 @@ def _front_of_palm(hand: UndescribedHand, z: Array) -> float:
     return float((poses[:, :, 3] @ z + reach).max())
 
 
-def _roles(
-    hand: UndescribedHand, skeleton: Skeleton, bending: Sequence[Mapping[str, float]], opposed: int
-) -> dict[str, str]:
-    roles = {}
-    for f, joints in enumerate(skeleton.fingers.values()):
+def _roles(hand: UndescribedHand, bending: Sequence[Mapping[str, float]], opposed: int) -> dict[str, str]:
+    roles = {joint: "drives" for joint in hand.leaders if joint not in hand.place}
+    for f, joints in enumerate(hand.skeleton.fingers.values()):
         for joint in joints:
-            if joint in skeleton.coupling:
-                roles[joint] = f"follows {skeleton.coupling[joint].follows}"
+            leader = hand.leader_of(joint)
+            if leader != joint:
+                roles[joint] = f"follows {leader}" if leader else "rests"
             elif _any(joint, bending):
                 roles[joint] = "slides" if hand.slides[hand.place[joint]] else "bends"
             else:

@@ -15,7 +15,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.hand.configuration import Coupling
 
 __all__ = ["Skeleton", "skeleton_of"]
 
@@ -36,9 +35,8 @@ class Skeleton(NamedTuple):
 
     palm: str  #: body
     fingers: Mapping[str, tuple[str, ...]]  #: joints of each finger, from the palm to the tip
-    ranges: Mapping[str, tuple[float, float]]  #: of the joints of fingers [rad or m]; a whole turn, or 1 m, if free
-    coupling: Mapping[str, Coupling]  #: joints of fingers that follow others
-    resting: tuple[str, ...]  #: joints below the palm that no finger has
+    others: tuple[str, ...]  #: joints below the palm that no finger has
+    driving: tuple[str, ...]  #: joints below the palm that actuators drive, if the model closes loops
 
 
 def skeleton_of(mujoco: Any, model: Any, file: str, palm: str = "") -> Skeleton:
@@ -58,9 +56,9 @@ class _Tree:
     def __init__(self, mujoco: Any, model: Any, file: str, palm: str):
         self.mujoco, self.model, self.file = mujoco, model, file
         self.parents = [int(b) for b in model.body_parentid]
-        self.names = [model.body(b).name for b in range(model.nbody)]
+        self.names = [model.body(b).name or f"body {b}" for b in range(model.nbody)]  # as rest.py names them
         if palm and palm not in self.names:
-            raise unknown_name("body", palm, [name for name in self.names if name])
+            raise unknown_name("body", palm, self.names)
         self.top = self.names.index(palm) if palm else 0
         kinds = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
         self.hinge = kinds[0]
@@ -98,25 +96,20 @@ class _Tree:
         named = self._named(fingers)
         below = [j for j in self.joints if self._body(j) != palm and self._is_below(self._body(j), palm)]
         return Skeleton(
-            self._name_of(palm),
+            self.names[palm],
             {name: tuple(self._label(j) for j in finger) for name, finger in named.items()},
-            {self._label(j): self._range(j) for j in moving},
-            self._coupling(moving),
             tuple(self._label(j) for j in below if j not in moving),
+            tuple(self._label(j) for j in self._driven() if j in below),
         )
 
     def _check(self, fingers: Sequence[Sequence[int]], moving: Sequence[int], palm: int) -> None:
         longest = max(map(len, fingers))
         if len(moving) > _MOST_JOINTS or longest > _MOST_CHAIN or len(fingers) > _MOST_FINGERS:
-            inside = self.names[palm] or "an unnamed body"
+            inside = self.names[palm]
             raise InputError(
                 f"{len(moving)} joints in {len(fingers)} chains move below {inside}, up to {longest} in one; a hand "
                 f"has up to {_MOST_JOINTS} in {_MOST_FINGERS} fingers of {_MOST_CHAIN}: name the palm with --palm BODY."
             )
-        for j in moving:
-            if not self._label(j):
-                body = self.names[self._body(j)] or "without name"
-                raise InputError(f"a joint of body '{body}' in {self.file!r} has no name; name it in the model.")
         hinges = [j for j in moving if self.model.jnt_type[j] == self.hinge and self.model.jnt_limited[j]]
         if hinges and all(np.ptp(self.model.jnt_range[j]) < _TINY for j in hinges):
             most = np.degrees(max(np.ptp(self.model.jnt_range[j]) for j in hinges))
@@ -126,7 +119,7 @@ class _Tree:
             )
 
     def _label(self, j: int) -> str:
-        return self.model.joint(j).name
+        return self.model.joint(j).name or f"joint {j}"  # as rest.py names it
 
     def _range(self, j: int) -> tuple[float, float]:
         if not self.model.jnt_limited[j]:
@@ -234,10 +227,6 @@ class _Tree:
                 tied[leaf] |= mine[0] - {leaf}
         return tied
 
-    def _name_of(self, body: int) -> str:
-        """Return the name of a body; of one without name, that of the nearest body above it that has one."""
-        return next(self.names[b] for b in reversed(self._above(body)) if self.names[b])
-
     def _named(self, fingers: Sequence[Sequence[int]]) -> dict[str, list[int]]:
         """Return the fingers by name: thumb, index, .. where the model's names say so."""
         found = []
@@ -251,26 +240,18 @@ class _Tree:
         unique = [name if name and found.count(name) == 1 else f"finger_{n + 1}" for n, name in enumerate(found)]
         return {name: list(finger) for name, finger in zip(unique, fingers, strict=True)}
 
-    def _coupling(self, moving: Sequence[int]) -> dict[str, Coupling]:
-        """Return which joints follow others by the model's equality constraints, as q = factor * leader + offset."""
-        model, kind = self.model, int(self.mujoco.mjtEq.mjEQ_JOINT)
-        follows: dict[int, tuple[int, float, float]] = {}
-        for e in range(model.neq):
-            follower, leader = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
-            if model.eq_type[e] != kind or follower not in moving or leader not in moving:
-                continue
-            zero = [float(model.qpos0[model.jnt_qposadr[j]]) for j in (follower, leader)]
-            factor = float(model.eq_data[e][1])
-            follows[follower] = leader, factor, zero[0] + float(model.eq_data[e][0]) - factor * zero[1]
-        coupling = {}
-        for follower in follows:
-            leader, factor, offset = follows[follower]
-            for _ in follows:  # whose leader follows as well; a circle ends here, too
-                if leader in follows and leader != follower:
-                    further = follows[leader]
-                    leader, offset, factor = further[0], offset + factor * further[2], factor * further[1]
-            if leader not in follows:
-                coupling[self._label(follower)] = Coupling(
-                    follows=self._label(leader), factor=round(factor, 6), offset=round(offset, 6)
-                )
-        return coupling
+    def _driven(self) -> list[int]:
+        """Return the joints that actuators drive, one by one or by tendons, if an equality closes a loop."""
+        model, mujoco = self.model, self.mujoco
+        if not any(kind != int(mujoco.mjtEq.mjEQ_JOINT) for kind in model.eq_type):
+            return []
+        driven: list[int] = []
+        for kind, target in zip(model.actuator_trntype, model.actuator_trnid[:, 0], strict=True):
+            if kind == int(mujoco.mjtTrn.mjTRN_JOINT):
+                driven.append(int(target))
+            elif kind == int(mujoco.mjtTrn.mjTRN_TENDON):
+                wraps = range(int(model.tendon_adr[target]), int(model.tendon_adr[target] + model.tendon_num[target]))
+                driven += [
+                    int(model.wrap_objid[w]) for w in wraps if model.wrap_type[w] == int(mujoco.mjtWrap.mjWRAP_JOINT)
+                ]
+        return driven

@@ -1,14 +1,17 @@
 """A hand that is not described yet: what its joints can do with its fingertips, in the frame of the palm's body."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import product
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.errors import InputError
+from surehold.grasping.hand.building import built_hand
 from surehold.grasping.hand.configuration import HandConfig
-from surehold.grasping.hand.files import load_hand
+from surehold.grasping.hand.coupling import JointCouplings
+from surehold.grasping.hand.rest import RestingModel
 from surehold.grasping.hand.skeleton import Skeleton
 from surehold.grasping.hand.tips import Fingertips
 
@@ -22,42 +25,90 @@ _STEPS: Final = 9  # postures on the way from open to closed
 _NEAR: Final = 0.02  # of a finger's length: differences below do not tell which tips come nearer to each other
 _WIDER: Final = np.radians(30.0)
 _FREE: Final = (0.5 * np.pi, 0.05)  # motion each way of a joint without limits that turns [rad], that slides [m]
+_SHARES: Final = (0.2, 0.05)  # of a range, over which followers are taken: a loop may not let it go farther
+_FOLLOWS: Final = 1e-6  # rad or m per unit of the leader
 
 
 class UndescribedHand:
     """The hand of a skeleton, whose palm frame is that of the palm's body.
 
-    `rest` (f, j) is its posture with all joints at 0, or at the nearest end of their range. Joints that follow others
-    have no value of their own: `leaders` are those that have one. `parts` are name, fingers and coupling as a
-    description has them.
+    `leaders` are the joints that have values of their own, and what they move, (j,) of all joints of the model per
+    unit: the others follow them or rest. Where links close loops, those that actuators drive come first. Followers are
+    taken as moving in proportion, which decides what bends and where to; a description is read by the exact rules.
     """
 
-    def __init__(self, model: str, skeleton: Skeleton, parts: Mapping[str, Any]):
+    def __init__(self, file: str, mujoco: Any, model: Any, skeleton: Skeleton):
         self.skeleton = skeleton
-        self.leaders = [j for joints in skeleton.fingers.values() for j in joints if j not in skeleton.coupling]
+        fingers = {finger: list(joints) for finger, joints in skeleton.fingers.items()}
         palm = {"body": skeleton.palm, "x": [1, 0, 0], "z": [0, 0, 1], "grasp_center": [0, 0, 0]}
-        first, (lower, upper) = self.leaders[0], skeleton.ranges[self.leaders[0]]
-        ends = {"open": {first: lower}, "closed": {first: upper}}  # any that differ
-        self.hand = load_hand(model, HandConfig.model_validate({**parts, "palm": palm, "preshapes": {"any": ends}}))
+        described: dict[str, Any] = {
+            "name": "hand",
+            "palm": palm,
+            "fingers": fingers,
+            "preshapes": {"p": {"closed": {}}},
+        }
+        resting = RestingModel(mujoco, model, HandConfig.model_validate(described))
+        self._ids = resting.joint_ids
+        #: of all joints that turn or slide [rad or m]; a whole turn or a meter each way without limits
+        self.ranges = {name: resting.range(j) for name, j in self._ids.items() if resting.moves(j)}
+        joints = [*skeleton.driving, *(joint for finger in fingers.values() for joint in finger)]
+        self._still, self.leaders = self._led(JointCouplings(resting), dict.fromkeys(joints))
+        first = next(iter(self.leaders))
+        away = np.clip(self._still[self._ids[first]], *self.ranges[first])
+        described["preshapes"] = {"p": {"open": {first: away}, "closed": {first: away + self._steps[first]}}}
+        self.hand = built_hand(RestingModel(mujoco, model, HandConfig.model_validate(described)), file)
         self.place = {name: divmod(i, self.hand.lower.shape[1]) for i, name in enumerate(self.hand.joint_names) if name}
-        self.rest = np.clip(0.0, self.hand.lower, self.hand.upper)
         self.tips = Fingertips(self.hand)
         self.slides = self.tips.slides
+        tips = self.tips.at(self.posture({}))
         #: mean distance from the first joint of a finger to its tip at rest [m]
-        self.length = float(np.linalg.norm(self.tips.at(self.rest) - self.hand.bases[:, :, 3], axis=1).mean())
+        self.length = float(np.linalg.norm(tips - self.hand.bases[:, :, 3], axis=1).mean())
 
     def at_rest(self, joint: str) -> float:
-        """Return where a joint rests [rad or m]."""
-        return float(self.rest[self.place[joint]])
+        """Return where a joint rests [rad or m]: at 0, or at the nearest end of its range, or where it follows."""
+        return float(self._still[self._ids[joint]])
 
     def posture(self, values: Values) -> Array:
-        """Return joint angles (f, j) of the joints that lead; followers follow, the others rest."""
-        q = self.rest.copy()
-        for joint, value in values.items():
-            q[self.place[joint]] = value
-        for follower, coupling in self.skeleton.coupling.items():
-            q[self.place[follower]] = coupling.factor * q[self.place[coupling.follows]] + coupling.offset
+        """Return joint angles (f, j) of the fingers from those of the joints that lead; the others follow or rest."""
+        every = self._still + sum((v - self.at_rest(joint)) * self.leaders[joint] for joint, v in values.items())
+        q = np.zeros_like(self.hand.lower)
+        for joint, place in self.place.items():
+            q[place] = every[self._ids[joint]]
         return np.clip(q, self.hand.lower, self.hand.upper)
+
+    def leader_of(self, joint: str) -> str:
+        """Return the joint that a joint of a finger follows most, "" for one that rests, itself for one that leads."""
+        if joint in self.leaders:
+            return joint
+        moved = {
+            name: abs(column[self._ids[joint]]) * np.ptp(self.ranges[name]) for name, column in self.leaders.items()
+        }
+        most = max(moved, key=lambda name: moved[name])
+        return most if moved[most] > _FOLLOWS else ""
+
+    def _led(self, couplings: JointCouplings, joints: Iterable[str]) -> tuple[Array, dict[str, Array]]:
+        """Return all joints at rest (j,), and what each joint that leads moves, (j,) per unit."""
+        names = list(self._ids)
+        still = np.array([np.clip(0.0, *self.ranges[name]) if name in self.ranges else 0.0 for name in names])
+        still = couplings.posture({}, still, "rest")
+        leaders: dict[str, Array] = {}
+        self._steps: dict[str, float] = {}
+        for joint in joints:
+            j = self._ids[joint]
+            if joint in couplings.followers() or any(abs(column[j]) > _FOLLOWS for column in leaders.values()):
+                continue
+            lower, upper = self.ranges[joint]
+            far = (upper if upper - still[j] >= still[j] - lower else lower) - still[j]
+            held = {name: float(still[self._ids[name]]) for name in leaders}
+            for share in _SHARES:
+                step = float(np.clip(share * far, -_FREE[0], _FREE[0]))
+                try:
+                    moved = couplings.posture({**held, joint: still[j] + step}, still, joint)
+                except InputError:  # the loop does not let it go that far
+                    continue
+                leaders[joint], self._steps[joint] = (moved - still) / step, step
+                break
+        return still, leaders
 
     def way(self, opened: Values, closed: Values) -> Array:
         """Return the tips (t, f, 3) on the way from one posture to another [m]."""
@@ -70,7 +121,7 @@ class UndescribedHand:
         """Return the posture of the leading joints in which the tips come nearest to each other."""
         from scipy.optimize import least_squares
 
-        lower, upper = np.array([self.skeleton.ranges[joint] for joint in self.leaders]).T
+        lower, upper = np.array([self.ranges[joint] for joint in self.leaders]).T
         rest = np.array([self.at_rest(joint) for joint in self.leaders])
 
         def residuals(v: Array) -> Array:
@@ -88,19 +139,23 @@ class UndescribedHand:
         return dict(zip(self.leaders, best.x.tolist(), strict=True))
 
     def bending(self) -> list[dict[str, float]]:
-        """Return the leading joints that bend or slide each finger, and in which sense with its last joint: +1, -1."""
-        frames, found = self.tips.frames(self.posture({})), []
+        """Return the leaders that bend or slide each finger, and in which sense with its last joint: +1 or -1."""
+        frames, found, taken = self.tips.frames(self.posture({})), [], set()
         for joints in self.skeleton.fingers.values():
             last = self.place[joints[-1]]
+            along = {j: float(frames[self.place[j]][:, 2] @ frames[last][:, 2]) for j in joints}
+            along = {
+                j: c
+                for j, c in along.items()
+                if abs(c) >= _PARALLEL and self.slides[self.place[j]] == self.slides[last]
+            }
             chosen: dict[str, float] = {}
-            for joint in joints:
-                place, leader = self.place[joint], joint
-                sense = float(frames[place][:, 2] @ frames[last][:, 2])
-                if joint in self.skeleton.coupling:
-                    leader = self.skeleton.coupling[joint].follows
-                    sense *= float(np.sign(self.skeleton.coupling[joint].factor))
-                if abs(sense) >= _PARALLEL and self.slides[place] == self.slides[last] and leader in joints:
-                    chosen.setdefault(leader, float(np.sign(sense)))
+            for leader, column in self.leaders.items():
+                moved = [j for j in along if abs(column[self._ids[j]]) > _FOLLOWS]
+                if moved and leader not in taken and (leader in moved or leader not in joints):
+                    first = leader if leader in moved else moved[0]
+                    chosen[leader] = float(np.sign(along[first] * column[self._ids[first]]))
+            taken |= set(chosen)
             found.append(chosen)
         return found
 
@@ -123,7 +178,7 @@ class UndescribedHand:
         for joint in (next(iter(group)) for group in bending if group):
             if not self._alone(joint):
                 outwards = np.sign(opened[joint] - closed[joint])
-                wider[joint] = float(np.clip(opened[joint] + _WIDER * outwards, *self.skeleton.ranges[joint]))
+                wider[joint] = float(np.clip(opened[joint] + _WIDER * outwards, *self.ranges[joint]))
         return wider
 
     def _ends(self, joints: Mapping[str, float], sense: int) -> tuple[dict[str, float], dict[str, float]]:
@@ -131,9 +186,9 @@ class UndescribedHand:
         opened, closed = {}, {}
         for joint, sign in joints.items():
             (lower, upper), rest, slides = (
-                self.skeleton.ranges[joint],
+                self.ranges[joint],
                 self.at_rest(joint),
-                self.slides[self.place[joint]],
+                self._slides(joint),
             )
             if upper - lower >= (1.999 if slides else 1.999 * np.pi):  # no limits, as they are read
                 lower, upper = rest - _FREE[int(slides)], rest + _FREE[int(slides)]
@@ -146,12 +201,15 @@ class UndescribedHand:
         """Return the senses in which a finger may close: of several joints that have room in one sense only, that."""
         room = 0.0
         for joint, sign in joints.items():
-            lower, upper = self.skeleton.ranges[joint]
+            lower, upper = self.ranges[joint]
             room += sign * (lower + upper - 2.0 * self.at_rest(joint)) / (upper - lower)
         alone = any(self._alone(joint) for joint in joints)
         return (1, -1) if alone or abs(room) < 0.3 * len(joints) else (int(np.sign(room)),)
 
+    def _slides(self, joint: str) -> bool:
+        return joint in self.place and bool(self.slides[self.place[joint]])
+
     def _alone(self, joint: str) -> bool:
-        """Whether a joint slides, or is the only one of its finger: then it may rest where the hand is closed."""
-        finger = next(joints for joints in self.skeleton.fingers.values() if joint in joints)
-        return bool(self.slides[self.place[joint]]) or len(finger) == 1
+        """Whether a joint slides, is the only one of its finger, or a bar: it may rest where the hand is closed."""
+        finger = next((joints for joints in self.skeleton.fingers.values() if joint in joints), (joint,))
+        return len(finger) == 1 or self._slides(joint)
