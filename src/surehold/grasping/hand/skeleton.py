@@ -1,11 +1,12 @@
 """Which part of a model is the palm and which are fingers, from the tree of its bodies and joints.
 
     leaf    a joint below which no other one moves and that moves something that can touch: the last one of a finger
-    reach   distance from the first joint of a chain to the farthest geometry that its leaf moves [m]
+    reach   distance from the first joint that a leaf does not share to the farthest geometry that its leaf moves [m]
 
 The palm is the last body that the chains of all leaves share; rigid bodies above it that can touch belong to it, a
-joint that carries several fingers is a part of it and stays at rest. A leaf that reaches less than half as far as the
-farthest one, or that an equality constraint ties to a farther one, is the bar of a linkage and no finger.
+joint that carries several fingers is a part of it and stays at rest. The bars of linkages are no fingers: a leaf that
+reaches less than half as far as the farthest one, that is connected to a farther one in a loop, or whose only joint is
+coupled to one that reaches 1.3 times as far.
 """
 
 import re
@@ -19,6 +20,7 @@ from surehold.errors import InputError, unknown_name
 __all__ = ["Skeleton", "skeleton_of"]
 
 _BAR: Final = 0.5  # of the farthest reach: what does not reach that far holds no object
+_LONGER: Final = 1.3  # times as far reaches a finger as the bar that is coupled to it
 _MOST_JOINTS, _MOST_CHAIN, _MOST_FINGERS = 32, 8, 8
 _TINY: Final = 0.1  # rad; a hand whose joints all turn less than that was written in radians and read in degrees
 _WORDS: Final = {
@@ -78,7 +80,7 @@ class _Tree:
         if not self.joints:
             raise InputError(f"no joint moves {where}: a hand without fingers; give the model of a hand.")
         chains = self._chains()
-        palm = self._palm(chains)
+        palm = self._palm(chains) if chains else self.top
         chains = {
             leaf: [j for j in chain if self._body(j) != palm and self._is_below(self._body(j), palm)]
             for leaf, chain in chains.items()
@@ -187,13 +189,20 @@ class _Tree:
 
     def _fingers(self, chains: Mapping[int, Sequence[int]]) -> list[int]:
         """Return the leaves that are fingers."""
-        reaches = {leaf: self._reach(chain) for leaf, chain in chains.items() if chain}
-        tied = self._tied(chains)
+        own = {
+            leaf: [j for j in chain if sum(j in other for other in chains.values()) == 1]
+            for leaf, chain in chains.items()
+            if chain
+        }
+        reaches = {leaf: self._reach(chain) for leaf, chain in own.items()}
+        closed, coupled = self._tied(chains)
         farthest = max(reaches.values(), default=0.0)
         return [
             leaf
             for leaf, reach in reaches.items()
-            if reach >= _BAR * farthest and not any(reaches.get(other, 0.0) > reach for other in tied[leaf])
+            if reach >= _BAR * farthest
+            and not any(reaches.get(other, 0.0) > reach for other in closed[leaf])
+            and not (len(own[leaf]) == 1 and any(reaches.get(other, 0.0) > _LONGER * reach for other in coupled[leaf]))
         ]
 
     def _reach(self, chain: Sequence[int]) -> float:
@@ -206,26 +215,35 @@ class _Tree:
             far = max(far, float(np.linalg.norm(placed - origin, axis=1).max()))
         return far
 
-    def _tied(self, chains: Mapping[int, Sequence[int]]) -> dict[int, set[int]]:
-        """Return the leaves with which each one closes a loop: their bodies are connected or welded."""
-        kinds = (int(self.mujoco.mjtEq.mjEQ_CONNECT), int(self.mujoco.mjtEq.mjEQ_WELD))
-        site = int(self.mujoco.mjtObj.mjOBJ_SITE)
-        tied: dict[int, set[int]] = {leaf: set() for leaf in chains}
-        for e in range(self.model.neq):
-            if self.model.eq_type[e] not in kinds:
-                continue
-            ends = [int(self.model.eq_obj1id[e]), int(self.model.eq_obj2id[e])]
-            if self.model.eq_objtype[e] == site:
-                ends = [int(self.model.site_bodyid[end]) for end in ends]
-            mine = [
-                {leaf for leaf, chain in chains.items() if chain and self._is_below(end, self._body(chain[-1]))}
-                for end in ends
-            ]
-            for leaf in mine[0]:
-                tied[leaf] |= mine[1] - {leaf}
-            for leaf in mine[1]:
-                tied[leaf] |= mine[0] - {leaf}
-        return tied
+    def _tied(self, chains: Mapping[int, Sequence[int]]) -> tuple[dict[int, set[int]], dict[int, set[int]]]:
+        """Return the leaves with which each one closes a loop (connected or welded), and those it is coupled to."""
+        model, kinds = self.model, self.mujoco.mjtEq
+        closed: dict[int, set[int]] = {leaf: set() for leaf in chains}
+        coupled: dict[int, set[int]] = {leaf: set() for leaf in chains}
+        for e in range(model.neq):
+            ends = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
+            tied = closed
+            if model.eq_type[e] in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
+                if model.eq_objtype[e] == int(self.mujoco.mjtObj.mjOBJ_SITE):
+                    ends = [int(model.site_bodyid[end]) for end in ends]
+                groups = [
+                    {leaf for leaf, chain in chains.items() if chain and self._is_below(end, self._body(chain[-1]))}
+                    for end in ends
+                ]
+            else:
+                tied = coupled
+                joints = ends if model.eq_type[e] == int(kinds.mjEQ_JOINT) else self._of_tendon(ends[0])
+                groups = [{leaf for leaf, chain in chains.items() if j in chain} for j in joints]
+            for group in groups:
+                for leaf in group:
+                    tied[leaf] |= set().union(*groups) - {leaf}
+        return closed, coupled
+
+    def _of_tendon(self, t: int) -> list[int]:
+        """Return the joints of a fixed tendon."""
+        wraps = range(int(self.model.tendon_adr[t]), int(self.model.tendon_adr[t] + self.model.tendon_num[t]))
+        kind = int(self.mujoco.mjtWrap.mjWRAP_JOINT)
+        return [int(self.model.wrap_objid[w]) for w in wraps if self.model.wrap_type[w] == kind]
 
     def _named(self, fingers: Sequence[Sequence[int]]) -> dict[str, list[int]]:
         """Return the fingers by name: thumb, index, .. where the model's names say so."""
@@ -250,8 +268,5 @@ class _Tree:
             if kind == int(mujoco.mjtTrn.mjTRN_JOINT):
                 driven.append(int(target))
             elif kind == int(mujoco.mjtTrn.mjTRN_TENDON):
-                wraps = range(int(model.tendon_adr[target]), int(model.tendon_adr[target] + model.tendon_num[target]))
-                driven += [
-                    int(model.wrap_objid[w]) for w in wraps if model.wrap_type[w] == int(mujoco.mjtWrap.mjWRAP_JOINT)
-                ]
+                driven += self._of_tendon(int(target))
         return driven

@@ -173,23 +173,19 @@ class UndescribedHand:
         return min(found, key=lambda one: one[:2])[2:]
 
     def widened(self, bending: list[dict[str, float]], opened: Values, closed: Values) -> dict[str, float]:
-        """Return open values at which the first joint that bends each finger is up to 30 degrees wider than at rest."""
-        wider = dict(opened)
-        for joint in (next(iter(group)) for group in bending if group):
-            if not self._alone(joint):
-                outwards = np.sign(opened[joint] - closed[joint])
-                wider[joint] = float(np.clip(opened[joint] + _WIDER * outwards, *self.ranges[joint]))
-        return wider
+        """Return open values at which the first joint that bends each finger is up to 30 degrees wider, all alike."""
+        firsts = [next(iter(group)) for group in bending if group]
+        if any(map(self._alone, firsts)):  # these are open already
+            return dict(opened)
+        out = {joint: int(opened[joint] > closed[joint]) for joint in firsts}
+        more = min(_WIDER, *(abs(self.ranges[joint][end] - opened[joint]) for joint, end in out.items()))
+        return {**opened, **{joint: opened[joint] + (more if end else -more) for joint, end in out.items()}}
 
     def _ends(self, joints: Mapping[str, float], sense: int) -> tuple[dict[str, float], dict[str, float]]:
         """Return open and closed values of the joints that bend a finger, if its last one closes in a sense."""
         opened, closed = {}, {}
         for joint, sign in joints.items():
-            (lower, upper), rest, slides = (
-                self.ranges[joint],
-                self.at_rest(joint),
-                self._slides(joint),
-            )
+            (lower, upper), rest, slides = self.ranges[joint], self.at_rest(joint), self._slides(joint)
             if upper - lower >= (1.999 if slides else 1.999 * np.pi):  # no limits, as they are read
                 lower, upper = rest - _FREE[int(slides)], rest + _FREE[int(slides)]
             near, far = (lower, upper) if sign * sense > 0.0 else (upper, lower)
