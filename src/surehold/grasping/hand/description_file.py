@@ -1,5 +1,7 @@
 """The description of a hand as YAML text with comments: what was found and what a person may want to change."""
 
+import json
+import re
 from typing import Any
 
 import yaml
@@ -8,6 +10,8 @@ from surehold.grasping.hand.proposal import Proposal
 
 __all__ = ["description_text"]
 
+_PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./-]*")
+
 
 def description_text(proposal: Proposal, model: str) -> str:
     """Return the YAML of a proposal; `model` is the path of its model as seen from the folder of the description."""
@@ -15,7 +19,7 @@ def description_text(proposal: Proposal, model: str) -> str:
     palm, (name, preshape) = config.palm, next(iter(config.preshapes.items()))
     kind = "a gripper: its fingers stand apart and close towards each other" if proposal.gripper else "a hand"
     lines = [
-        f"# Proposed by `surehold hand new {model}`, from the places of bodies and joints.",
+        f"# Proposed by `surehold hand new {_text(model)}`, from the places of bodies and joints.",
         "# Look at it with `surehold hand show`; lengths are in meters, angles in radians.",
         f"name: {_text(config.name)}",
         f"model: {{file: {_text(model)}}}  # seen from this file's folder",
@@ -30,24 +34,23 @@ def description_text(proposal: Proposal, model: str) -> str:
         opposed = "  # the others close against it" if finger == proposal.opposed else ""
         lines.append(f"  {_text(finger)}: [{', '.join(map(_text, joints))}]{opposed}")
     if proposal.resting:
-        lines.append(f"# joints that stay at rest: {', '.join(proposal.resting)}")
-    followers = [f"{joint} {role}" for joint, role in proposal.roles.items() if role.startswith("follows ")]
+        lines.append(f"# joints that stay at rest: {', '.join(map(_text, proposal.resting))}")
+    followers = [
+        f"{_text(joint)} follows {_text(role[8:])}" for joint, role in proposal.roles.items() if role[:8] == "follows "
+    ]
     if followers:
         lines.append(f"# by the model: {', '.join(followers)}")
+    rest = "joints that are not named are at 0, or at the nearest end of their range"
     lines += [
         "# finger_force: 8  # what a stretched finger can exert at its tip [N]: of the maker's data sheet",
         "# friction: 0.6    # coefficient of its skin on objects; the object's own otherwise",
         "preshapes:",
         f"  {name}:",
-        "    open:  # joints that are not named are at 0, or at the nearest end of their range",
+        f"    open:  # {rest}" if preshape.open else f"    open: {{}}  # {rest}",
         *(_joint_line(joint, value, proposal) for joint, value in preshape.open.items()),
         "    closed:  # as far as a joint goes where nothing stops it",
         *(_joint_line(joint, value, proposal) for joint, value in preshape.closed.items()),
     ]
-    if not preshape.open:
-        lines[lines.index("    open:  # joints that are not named are at 0, or at the nearest end of their range")] = (
-            "    open: {}  # all joints at 0, or at the nearest end of their range"
-        )
     opposing = [joint for joint, role in proposal.roles.items() if role == "opposes"]
     if opposing:
         lines += [
@@ -59,7 +62,7 @@ def description_text(proposal: Proposal, model: str) -> str:
 
 def _meaning_of_x(proposal: Proposal) -> str:
     if proposal.gripper:
-        return f"across, away from {proposal.opposed}"
+        return f"across, away from {_text(proposal.opposed)}"
     return "along the fingers"
 
 
@@ -73,5 +76,5 @@ def _vector(values: Any) -> str:
 
 
 def _text(name: str) -> str:
-    """Return a name as YAML writes it: quoted where it would be read as something else."""
-    return yaml.safe_dump(name, default_style=None, width=10_000).splitlines()[0]
+    """Return a name as YAML writes it in one line: quoted where it would be read as something else."""
+    return name if _PLAIN.fullmatch(name) and yaml.safe_load(name) == name else json.dumps(name)

@@ -41,8 +41,8 @@ def hand_faults(hand: Hand, preshape: str | None = None) -> list[str]:
 
     - The fingertips close behind the palm: on their way they are, on average, below the middle of the palm's boxes,
       seen along the palm's z.
-    - Open and closed are exchanged: the tips that move are nearest to each other when the hand is open, and at least
-      2 mm farther apart when it is closed.
+    - Open and closed are exchanged: when the hand is closed, the tips that move are at least 2 mm farther from their
+      middle, and from the grasp center, than when it is open.
     - A finger never moves: its tip stays within 1 mm in every preshape of the hand.
     """
     every = {name: finger_motions(hand, name) for name in hand.preshapes}
@@ -57,7 +57,8 @@ def hand_faults(hand: Hand, preshape: str | None = None) -> list[str]:
                 "palm.z point out of the back of the hand?"
             )
         apart = np.linalg.norm(moving - moving.mean(axis=0), axis=2).mean(axis=0)  # (t,)
-        if apart[-1] > apart[0] + _APART and apart.argmin() == 0:
+        away = np.linalg.norm(moving - hand.grasp_center, axis=2).mean(axis=0)
+        if min(apart[-1] - apart[0], away[-1] - away[0]) > _APART:
             faults.append(
                 f"In '{name}' the fingertips are {1e3 * apart[0]:.0f} mm from their middle when the hand is open, and "
                 f"{1e3 * apart[-1]:.0f} mm when it is closed: are open and closed exchanged?"

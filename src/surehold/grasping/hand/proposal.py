@@ -97,7 +97,7 @@ def propose_hand(model: str | Path, palm: str = "") -> Proposal:
         "preshapes": {"pinch" if gripper and len(names) == 2 else "power": preshape},
     }
     roles = _roles(hand, bending, opposed)
-    resting = tuple(joint for joint in skeleton.others if joint not in roles)
+    resting = tuple(joint for joint in skeleton.others if not hand.leader_of(joint))
     ranges = {joint: hand.ranges[joint] for joint in roles}
     return Proposal(HandConfig.model_validate(description), ranges, roles, names[opposed], gripper, resting)
 
