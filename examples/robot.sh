@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A robot that knows nothing of Python: curl and jq ask a study over HTTP, try, and tell.
 #
-#   surehold study create arm --parameters dx=-0.05:0.05,grip=pinch/power --noise dx=0.003,grip=0 --units dx=m
+#   surehold study create arm --parameters dx=-0.05:0.05,grip=pinch/power --noise dx=0.003 --units dx=m
 #   SUREHOLD_TOKEN=a-token-of-16-characters surehold study serve arm --port 8765
 #   SUREHOLD_TOKEN=a-token-of-16-characters bash examples/robot.sh http://127.0.0.1:8765/studies/arm 20
 set -euo pipefail

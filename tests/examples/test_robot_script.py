@@ -23,22 +23,20 @@ def test_a_robot_in_bash_finds_the_place(tmp_path, monkeypatch, capfd):
     monkeypatch.setenv("SUREHOLD_TOKEN", "a-token-of-16-characters")
     assert run(["study", "create", "arm", "--parameters", "dx=-0.05:0.05,grip=pinch/power", "--noise", "dx=0.003"]) == 0
     command = [sys.executable, "-m", "surehold", "study", "serve", "arm", "--port", "0"]
-    served = subprocess.Popen(command, env={**os.environ}, stdout=subprocess.PIPE, text=True)
-    try:
-        assert served.stdout is not None
-        address = served.stdout.readline().split(" at ")[1].split("/ ")[0]
-        robot = subprocess.run(
-            ["bash", SCRIPT, f"{address}/studies/arm", "22"], capture_output=True, text=True, timeout=300
-        )
-        assert robot.returncode == 0, robot.stderr + robot.stdout
-        found = json.loads(robot.stdout)
-        assert found["parameters"]["grip"] == "power"
-        assert abs(found["parameters"]["dx"] - 0.01) < 0.004
-        refused = subprocess.run(
-            ["bash", SCRIPT, f"{address}/studies/leg", "1"], capture_output=True, text=True, timeout=300
-        )
-        assert refused.returncode != 0
-        assert "leg" in refused.stderr, "it says why"
-    finally:
-        served.terminate()
-        served.wait(timeout=30)
+    with subprocess.Popen(command, env={**os.environ}, stdout=subprocess.PIPE, text=True) as served:
+        try:
+            address = served.stdout.readline().split(" at ")[1].split("/ ")[0]
+            robot = subprocess.run(
+                ["bash", SCRIPT, f"{address}/studies/arm", "22"], capture_output=True, text=True, timeout=300
+            )
+            refused = subprocess.run(
+                ["bash", SCRIPT, f"{address}/studies/leg", "1"], capture_output=True, text=True, timeout=300
+            )
+        finally:
+            served.terminate()
+    assert robot.returncode == 0, robot.stderr + robot.stdout
+    found = json.loads(robot.stdout)
+    assert found["parameters"]["grip"] == "power"
+    assert abs(found["parameters"]["dx"] - 0.01) < 0.004
+    assert refused.returncode != 0
+    assert "leg" in refused.stderr, "it says why"
