@@ -7,7 +7,7 @@ workers. What comes back are numbers; `Simulator.grasp` gives the contacts of a 
 import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from surehold.grasping.simulator import Simulator
 __all__ = ["GraspBatch", "grasp_batch"]
 
 _CHUNK = 100  # trials that a worker takes at a time, at most: a fifth of a second
+_IDLE = 300  # seconds after which workers that have nothing to do end
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +71,14 @@ def grasp_batch(simulator: Simulator, poses: Sequence[Pose], s1: ArrayLike = 0.0
     if workers == 1 or len(parts) < 2:
         rows = [_outcomes(simulator, poses[part], postures[part]) for part in parts]
     else:
-        from joblib import Parallel, delayed
+        from joblib.externals.loky import get_reusable_executor
 
         simulator.warm_up()  # compiled once, read from the cache by the workers
         content = pickle.dumps(simulator)
-        # Arrays are copied, not mapped: read-only ones would be compiled for anew.
-        pool = Parallel(n_jobs=int(workers), max_nbytes=None, inner_max_num_threads=1, backend="loky")
-        rows = pool(delayed(_outcomes_there)(content, poses[part], postures[part].copy()) for part in parts)
+        pool = get_reusable_executor(int(workers), timeout=_IDLE, env={"OPENBLAS_NUM_THREADS": "1"})
+        rows = list(
+            pool.map(partial(_outcomes_there, content), [(poses[part], postures[part].copy()) for part in parts])
+        )
     table = np.concatenate([np.empty((0, 5)), *rows])  # type: ignore[list-item]
     quality, status, penetration, contacts, fallbacks = table.T
     return GraspBatch(
@@ -94,8 +96,8 @@ def _simulator(content: bytes) -> Simulator:
     return pickle.loads(content)
 
 
-def _outcomes_there(content: bytes, poses: Sequence[Pose], postures: NDArray[np.float64]) -> NDArray[np.float64]:
-    return _outcomes(_simulator(content), poses, postures)
+def _outcomes_there(content: bytes, part: tuple[Sequence[Pose], NDArray[np.float64]]) -> NDArray[np.float64]:
+    return _outcomes(_simulator(content), *part)
 
 
 def _outcomes(simulator: Simulator, poses: Sequence[Pose], postures: NDArray[np.float64]) -> NDArray[np.float64]:

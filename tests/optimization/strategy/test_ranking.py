@@ -1,5 +1,7 @@
 """Ranking against the model's outcomes at every point of a fine grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -118,3 +120,6 @@ def test_what_was_ranked_is_ranked_again_only_for_other_trials_or_another_model(
     other = ranking.trials(upside_down, HISTORY, False)
     assert np.array_equal(other, ranking_of().trials(upside_down, HISTORY, False))
     assert other[0] != ranking.trials(posterior, HISTORY, False)[0]
+    averse = replace(ranking, risk=Risk("worst"))
+    assert np.array_equal(averse.trials(posterior, HISTORY, False), averse.order(posterior, TRIED))
+    assert not np.array_equal(averse.order(posterior, TRIED), ranking.order(posterior, TRIED))

@@ -62,7 +62,7 @@ class Ranking:
     screened: bool = True
     """whether the coarse perturbations and a part of the particles choose which inputs are ranked accurately"""
     _last: list[tuple[Posterior, NDArray[np.float64], NDArray[np.intp]]] = field(
-        default_factory=list, repr=False, compare=False
+        default_factory=list, init=False, repr=False, compare=False
     )
     """posterior, tried inputs and their order: of asks between which nothing is told, only the first one ranks"""
 
