@@ -280,6 +280,12 @@ def test_doctor_version_and_help(capsys):
     assert "--facet" in capsys.readouterr().out
 
 
+def test_doctor_says_how_to_install_what_is_missing(capsys, monkeypatch):
+    monkeypatch.setattr("surehold.extras.missing", lambda extra: ["libigl"] if extra == "mesh" else [])
+    assert run(["doctor"]) == 0
+    assert "without libigl: pip install 'surehold[mesh]'" in " ".join(capsys.readouterr().out.split())
+
+
 @pytest.mark.parametrize(("group", "command"), [("", "maximize"), ("campaign", "report"), ("study", "recommend")])
 def test_a_group_alone_prints_its_help(group, command, capsys):
     assert surehold(group) == 0

@@ -51,7 +51,7 @@ def doctor(
         table.add_row("data cache", data_cache())
     for name, found in graphics_libraries().items():
         table.add_row(name, found or "not found; only needed for still pictures by MuJoCo")
-    Console(highlight=False).print(table)
+    Console(highlight=False, markup=False).print(table)
 
 
 def _warm() -> None:

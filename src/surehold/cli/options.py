@@ -32,8 +32,8 @@ __all__ = [
 ]
 
 METHODS = {
-    "ubo": "knows the input noise and looks for what holds",
-    "bo": "plain Bayesian optimization; the noise only scores its answer",
+    "ubo": "knows the input noise",
+    "bo": "is plain Bayesian optimization",
 }
 
 Method = Annotated[str, typer.Option(help="ubo: knows the input noise; bo: plain Bayesian optimization.")]

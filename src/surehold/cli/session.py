@@ -17,6 +17,7 @@ from rich.table import Table
 
 from surehold.cli.compilation import announced, warm_up
 from surehold.cli.interruption import terminable, undisturbed
+from surehold.cli.options import METHODS
 from surehold.cli.terminal import terminal
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.maximization import Result, Trial, maximize
@@ -138,7 +139,8 @@ def run_session(
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
         console.print(
-            f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), method {method}, seed {seed}"
+            f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), seed {seed}; "
+            f"method {method} {METHODS[method]}"
         )
         with announced(console):
             warm_up(problem, options, console)

@@ -68,10 +68,12 @@ def default_n_initial(box: Box, variables: int | None = None) -> int:
     return max(DESIGN_LEAST, min(DESIGN_PER_VARIABLE * d, DESIGN_MOST + d // DESIGN_VARIABLES_PER_MORE))
 
 
-def whole_number(name: str, value: int, least: int) -> int:
-    """Return the argument `name` as an int; raises InputError where it is none of `least` or more."""
+def whole_number(name: str, value: int, least: int, most: float = np.inf) -> int:
+    """Return the argument `name` as an int; raises InputError where it is none from `least` to `most`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
+    if value > most:
+        raise InputError(f"{name} is {value}; give {most:,} at most.")
     return int(value)
 
 

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Optimizer"]
 
+_MOST_AT_ONCE = 100_000  # trials asked for in one call; more is a slip of the pen
+
 
 class Optimizer(Record):
     """Bayesian optimization by ask and tell.
@@ -273,7 +275,9 @@ class Optimizer(Record):
         return self._ask_one(number) if n is None else self._ask(n, number)
 
     def _ask(self, n: int, number: int | None) -> list[AskedTrial]:
-        return [self._ask_one(None if number is None else number + i) for i in range(whole_number("n", n, 1))]
+        return [
+            self._ask_one(None if number is None else number + i) for i in range(whole_number("n", n, 1, _MOST_AT_ONCE))
+        ]
 
     def _ask_one(self, number: int | None) -> AskedTrial:
         position = self._trials.next_number if number is None else whole_number("number", number, 0)

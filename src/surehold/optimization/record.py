@@ -19,6 +19,7 @@ from surehold.optimization.limits import Limit
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.points import column_of
 from surehold.optimization.success import counted
 from surehold.optimization.trials import AskedTrial, Trials
 from surehold.optimization.values import number_of, told_noise
@@ -197,7 +198,7 @@ class Record(ABC):
         InputError
             If shapes do not fit, an input is not finite, X or pending lie outside the box, or a value is infinite.
         """
-        values = self._sign * np.asarray(y, dtype=np.float64)
+        values = self._sign * column_of("y", y)
         if self.outcome == "success":
             values = np.where(np.isnan(values), 0.0, values)  # a failed trial did not succeed
         trials = Trials(self.box, self._trials.limits, self.outcome != "value")

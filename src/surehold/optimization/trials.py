@@ -17,8 +17,16 @@ from surehold.defaults import ROUNDED
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit, checked_outputs
+from surehold.optimization.points import column_of
 from surehold.optimization.trial_inputs import trial_input, trial_inputs
-from surehold.optimization.values import checked_pairs, number_of, outliers_among, shares_won
+from surehold.optimization.values import (
+    LARGEST,
+    LARGEST_SQUARED,
+    checked_pairs,
+    number_of,
+    outliers_among,
+    shares_won,
+)
 
 __all__ = ["AskedTrial", "Trials", "same"]
 
@@ -272,13 +280,18 @@ class Trials:
                 f"y has shape {values.shape} and reached {len(actual)} rows, but X has {len(inputs)} rows; give one "
                 "value and one reached input a trial."
             )
-        if np.isinf(values).any():
-            raise InputError(f"y holds infinity at row {int(np.argmax(np.isinf(values)))}; give NaN for failed trials.")
-        measured = np.full((len(inputs), len(self.limits)), np.nan) if outputs is None else np.asarray(outputs, float)
-        if measured.shape != (len(inputs), len(self.limits)) or np.isinf(measured).any():
+        if (huge := np.abs(values) > LARGEST).any():
+            row = int(np.argmax(huge))
             raise InputError(
-                f"outputs have shape {measured.shape}; give one finite number, or NaN, for each of {len(inputs)} "
-                f"trials and {len(self.limits)} constraints."
+                f"y holds {values[row]:g} at row {row}; give numbers up to {LARGEST:g}, or NaN for failed trials."
+            )
+        measured = (
+            np.full((len(inputs), len(self.limits)), np.nan) if outputs is None else column_of("outputs", outputs)
+        )
+        if measured.shape != (len(inputs), len(self.limits)) or (np.abs(measured) > LARGEST_SQUARED).any():
+            raise InputError(
+                f"outputs have shape {measured.shape}; give one number up to {LARGEST_SQUARED:g}, or NaN, for each of "
+                f"{len(inputs)} trials and {len(self.limits)} constraints."
             )
         of = np.ones(len(inputs), dtype=np.intp) if executions is None else np.asarray(executions)
         if of.shape != values.shape or (len(of) and (of.dtype.kind not in "iu" or np.any(of < 1))):
@@ -286,9 +299,9 @@ class Trials:
         whole = np.abs(of * values - np.round(of * values)) < 1e-6
         if self._counted and not np.all((values >= 0.0) & (values <= 1.0) & whole):
             raise InputError("y holds a number that is no share of successes; give successes divided by executions.")
-        spread = np.zeros(len(inputs)) if deviations is None else np.asarray(deviations, dtype=np.float64)
-        if spread.shape != values.shape or not np.all(np.isfinite(spread) & (spread >= 0.0)):
-            raise InputError("noise holds no standard deviation, a finite number of 0 or more, for some trial.")
+        spread = np.zeros(len(inputs)) if deviations is None else column_of("noise", deviations)
+        if spread.shape != values.shape or not np.all((spread >= 0.0) & (spread <= LARGEST_SQUARED)):
+            raise InputError(f"noise holds no standard deviation, 0 to {LARGEST_SQUARED:g}, for some trial.")
         total = len(inputs) + len(waiting)
         given = np.arange(total) if numbers is None or total == 0 else np.asarray(numbers)
         whole = given.shape == (total,) and given.dtype.kind in "iu" and np.all(given >= 0)

@@ -1,6 +1,6 @@
 """Values of trials as they are told: checked, outliers among them, and the shares that stand for comparisons."""
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,7 +9,10 @@ from surehold.defaults import OUTLIER_DISTANCE
 from surehold.errors import InputError
 from surehold.optimization.points import numbers_of
 
-__all__ = ["checked_pairs", "number_of", "outliers_among", "shares_won", "told_noise"]
+__all__ = ["LARGEST", "LARGEST_SQUARED", "checked_pairs", "number_of", "outliers_among", "shares_won", "told_noise"]
+
+LARGEST: Final = 1e300  #: magnitude of a value; differences and sums of larger ones overflow
+LARGEST_SQUARED: Final = 1e150  #: magnitude of a number of which squares are taken
 
 
 def number_of(y: Any) -> float:
@@ -20,10 +23,14 @@ def number_of(y: Any) -> float:
         value = numbers_of(y)
     except (TypeError, ValueError, OverflowError):
         shown = " ".join(repr(y).split())
+        shown = shown if len(shown) <= 80 else f"{shown[:77]}..."
         raise InputError(f"y is {shown}; give one finite number, or failed=True.") from None
     if value.size != 1 or not np.isfinite(value).all():
         raise InputError(f"y is {y!r}; give one finite number, or failed=True for a trial that gave nothing.")
-    return float(value.reshape(()))
+    number = float(value.reshape(()))
+    if abs(number) > LARGEST:
+        raise InputError(f"y is {number:g}, of which no model can be made; give it in another unit, or failed=True.")
+    return number
 
 
 def told_noise(noise: Any, wanted: bool) -> float:
@@ -36,8 +43,8 @@ def told_noise(noise: Any, wanted: bool) -> float:
         value = float(numbers_of(noise).reshape(())) if noise is not None else np.nan
     except (TypeError, ValueError, OverflowError):
         value = np.nan
-    if not (np.isfinite(value) and value >= 0.0):
-        raise InputError(f"noise is {noise!r}; tell the standard deviation of y, a finite number of 0 or more.")
+    if not 0.0 <= value <= LARGEST_SQUARED:
+        raise InputError(f"noise is {noise!r}; tell the standard deviation of y, from 0 to {LARGEST_SQUARED:g}.")
     return value
 
 

@@ -6,7 +6,7 @@ that could change it, so a study can be interrupted, resumed and shared by any n
 
 import threading
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -21,11 +21,11 @@ from optuna.trial import FrozenTrial
 from surehold.defaults import MANY, SUCCESS_PLACES
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.protocol import Surrogate
 from surehold.studies.allowed import allowed_in
-from surehold.studies.history import History, history_of
+from surehold.studies.history import History, Reader
 from surehold.studies.search_space import SearchSpace
 
 __all__ = ["Sampler"]
@@ -103,10 +103,11 @@ class Sampler(BaseSampler):
         self._warn = warn_independent_sampling
         self._common = IntersectionSearchSpace()
         self._kept: tuple[tuple[Any, ...], Optimizer] | None = None  # saves time, changes nothing
+        self._reader: tuple[dict[str, BaseDistribution], Reader] | None = None  # as well
         self._lock = threading.RLock()
         # What is wrong is told now, not at the first trial.
         if self._space is None:
-            anything = InputNoise.unit(0.1) if input_noise is not None else None
+            anything = None if checked_input_noise(input_noise, ("x",)) is None else InputNoise.unit(0.1)
             Optimizer(Box.unit(1), input_noise=anything, **self._settings)
         elif self._space.box is not None:
             self._new_optimizer(self._space, "maximize")
@@ -157,8 +158,15 @@ class Sampler(BaseSampler):
         space = space or self._known_space()
         if space.box is None:
             return space.complete({})
-        with self.optimizing(space, history_of(trials, space, number, self.outputs), direction) as optimizer:
+        with self.optimizing(space, self.history(trials, space, number), direction) as optimizer:
             return space.complete(optimizer.ask_trial(number=number).parameters)
+
+    def history(self, trials: Iterable[FrozenTrial], space: SearchSpace, number: int | None = None) -> History:
+        """Return what all trials of a study say, as `history_of` does; only new ones are read."""
+        with self._lock:
+            if self._reader is None or self._reader[0] != space.distributions:
+                self._reader = (space.distributions, Reader(space, self.outputs))
+            return self._reader[1].read(trials, number)
 
     def optimizer(self, study: Study) -> Optimizer:
         """Return a new optimizer that has been told the study's trials.
@@ -169,7 +177,7 @@ class Sampler(BaseSampler):
             If the study has several objectives, or no parameter can vary.
         """
         space = self.search_space(study)
-        history = history_of(study.get_trials(deepcopy=False), space, outputs=self.outputs)
+        history = self.history(study.get_trials(deepcopy=False), space)
         optimizer = self._new_optimizer(space, direction_of(study))
         optimizer.restore(
             history.X,
@@ -249,7 +257,7 @@ class Sampler(BaseSampler):
         return Optimizer(space.box, input_noise=self._input_noise, **settings)
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_kept": None, "_lock": None}
+        return self.__dict__ | {"_kept": None, "_reader": None, "_lock": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state | {"_lock": threading.RLock()})
