@@ -68,6 +68,8 @@ copybutton_prompt_is_regexp = True
 
 # --- reference -------------------------------------------------------------------------------------------------------
 autodoc_typehints = "signature"
+maximum_signature_line_length = 80  # longer ones have a line for each parameter
+toc_object_entries_show_parents = "hide"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
 autosummary_generate = True
