@@ -145,9 +145,10 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         tag = "refused" if label["role"] == "high" else "holds better"
     svg = None
     if shaken and not report.counted:
+        what = f"the {candidate.label} point" if report.succeeded else report.called(candidate)
         name = f"shake-{label['role']}"
         text = (
-            f"Histogram of {candidate.values.size} re-queries of the {candidate.label} point: mean "
+            f"Histogram of {candidate.values.size} re-queries of {what}: mean "
             f"{number(candidate.mean)}, worst {number(candidate.worst)}"
         )
         svg = Markup(figures.inline_svg(drawings[figures.shake_name(candidate)], name, text))
