@@ -82,6 +82,8 @@ sphinx_gallery_conf = {
     "examples_dirs": [str(DOCS.parent / "examples" / "gallery")],
     "gallery_dirs": ["generated/gallery"],
     "filename_pattern": r".*\.py$",
+    "subsection_order": [f"../examples/gallery/{name}" for name in ("noise", "trials", "models", "grasps")],
+    "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": True,
     "image_scrapers": ("matplotlib",),
     "download_all_examples": False,

@@ -9,6 +9,8 @@ import pytest
 import yaml
 
 from surehold.cli import run
+from surehold.optimization.success import SUCCESS_SURROGATES
+from surehold.optimization.surrogates.named import SURROGATES
 from surehold.reports import files
 
 OWN = """
@@ -282,6 +284,12 @@ def test_doctor_version_and_help(capsys):
     assert "--facet" in capsys.readouterr().out
 
 
+def test_doctor_says_how_to_install_what_is_missing(capsys, monkeypatch):
+    monkeypatch.setattr("surehold.extras.missing", lambda extra: ["libigl"] if extra == "mesh" else [])
+    assert run(["doctor"]) == 0
+    assert "without libigl: pip install 'surehold[mesh]'" in " ".join(capsys.readouterr().out.split())
+
+
 @pytest.mark.parametrize(("group", "command"), [("", "maximize"), ("campaign", "report"), ("study", "recommend")])
 def test_a_group_alone_prints_its_help(group, command, capsys):
     assert surehold(group) == 0
@@ -356,6 +364,25 @@ def test_a_study_minimizes(here, capsys):
     assert surehold("study recommend down") == 0
     assert surehold("study create up --parameters x=0:1 --direction sideways") == 2
     assert "maximize" in capsys.readouterr().err
+
+
+def test_the_surrogate_is_chosen_by_name(here, capsys):
+    (here / "rig.py").write_text("def held(x):\n    return bool(0.4 < x[0] < 0.8)\n")
+    assert surehold("maximize --help") == 0
+    shown = capsys.readouterr().out
+    for name in (*SURROGATES, *SUCCESS_SURROGATES):
+        assert name in shown, name
+    line = "--bounds x=0:1 --noise 0.03 --trials 6 --initial 4"
+    assert surehold(f"maximize rig.py:held {line} --surrogate tpg") == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "'tpg' is unknown; did you mean 'tgp'? Choose one of: two_scales, gp, tgp, local_global." in told
+    assert surehold(f"maximize rig.py:held {line} --outcome success --surrogate beta") == 2
+    assert "hoose one of: probit, beta_process." in " ".join(capsys.readouterr().err.split())
+    assert surehold(f"maximize rig.py:held {line} --outcome success --surrogate beta_process --out found") == 0
+    found = json.loads((here / "found" / "result.json").read_text())
+    assert found["settings"]["surrogate"] == "beta_process"
+    assert surehold(f"maximize rig.py:held {line} --outcome success --out probit") == 0
+    assert json.loads((here / "probit" / "result.json").read_text())["trials"] != found["trials"]
 
 
 def test_a_run_of_successes_speaks_of_shares(here, capsys):

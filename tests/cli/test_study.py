@@ -76,6 +76,18 @@ def test_a_robot_by_commands(study, here):
     assert len(lines) == 10
 
 
+def test_stop_says_when_asking_ends(study, capsys):
+    study(CREATE)
+    for options, words in (
+        ("--trials 3", "open, ends after 3 trials in all\n"),
+        ("--trials 3 --improvement 0.01", "open, ends after 3 trials in all, or when 3 trials in a row promise less"),
+        ("--hours 1", "open, ends at 2"),
+        ("", "open, never ends by itself"),
+    ):
+        assert run(["study", "stop", "mug", *options.split()]) == 0
+        assert words in capsys.readouterr().out
+
+
 def test_people_by_commands(study):
     study(CREATE)
     study("ask mug")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from surehold.cli import study_people, study_service
-from surehold.cli.options import Allowed, Constraint
+from surehold.cli.options import Allowed, Constraint, Failures, First, Safety, Surrogate
 from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, quiet, say, write_out
 
 __all__ = ["studies"]
@@ -61,7 +61,7 @@ def create(
     ] = "",
     seed: Annotated[int, typer.Option(help="Same seed, same suggestions.")] = 0,
     initial: Annotated[int | None, typer.Option(help="Trials of the initial design.")] = None,
-    surrogate: Annotated[str, typer.Option(help="two_scales (default), gp or tgp (default from 400 trials on).")] = "",
+    surrogate: Surrogate = "",
     criterion: Annotated[str, typer.Option(help="As in surehold.Optimizer.", show_default=False)] = "",
     risk: Annotated[str, typer.Option(help="mean, mean-std, var, cvar or worst.")] = "mean",
     observation_noise: Annotated[
@@ -74,6 +74,9 @@ def create(
     feasible: Annotated[
         float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
     ] = 0.0,
+    failures: Failures = "",
+    safety: Safety = 0.0,
+    first: First = None,
     outcome: Annotated[
         str, typer.Option(help="Of a trial: value, or success (tell success, failure or 7/10).")
     ] = "value",
@@ -93,7 +96,7 @@ def create(
     optimizer |= {} if risk == "mean" else {"risk": risk}
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
     optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
-    optimizer |= limits_given(constraint, allowed, feasible)
+    optimizer |= limits_given(constraint, allowed, feasible, failures, safety, first)
     input_noise = None if noise.strip().lower() == "none" else noise_of(noise, "bo")
     if space.box is None or space.box.numbers is None:
         input_noise = None  # choices carry none

@@ -16,13 +16,13 @@ from surehold.grasping.closing.contacts import (
     blended,
     pass_share,
     skin_contacts,
-    skin_samples,
     touch_contacts,
 )
 from surehold.grasping.grasp import Grasp, Status
 from surehold.grasping.hand.kinematics import link_ends, link_frames
 from surehold.grasping.hand.model import CLOSED, Hand
 from surehold.grasping.hand.named import hand_named
+from surehold.grasping.hand.skin import skin_samples
 from surehold.grasping.hand.synergy import ClosingMotion, closing_motion, preshape_of
 from surehold.grasping.object.distance_field import MARGIN, DistanceField, distance_field_of
 from surehold.grasping.object.model import GraspObject

@@ -162,15 +162,16 @@ class Box:
         """
         X = np.zeros((len(rows), self.dimension))
         names = [variable.name for variable in self.variables]
-        for x, row in zip(X, rows, strict=True):
+        for row in rows:
             if len(row) != len(names) or any(name not in row for name in names):
                 raise InputError(f"point {dict(row)!r} does not fit; name exactly {', '.join(names)}.")
-            for variable in self.variables:
-                own, value = self._columns[variable.name], row[variable.name]
-                if isinstance(variable, Number):
-                    x[own] = variable.to_coordinate(np.array([variable.anywhere(value, "point")], dtype=np.float64))
-                else:
-                    x[own.start + variable.place(value)] = 1.0
+        for variable in self.variables:
+            own, values = self._columns[variable.name], [row[variable.name] for row in rows]
+            if isinstance(variable, Number):
+                numbers = np.array([variable.anywhere(value, "point") for value in values], dtype=np.float64)
+                X[:, own] = variable.to_coordinate(numbers)[:, None]
+            else:
+                X[np.arange(len(rows)), [own.start + variable.place(value) for value in values]] = 1.0
         return X
 
     def points(self, x: Any) -> NDArray[np.float64]:

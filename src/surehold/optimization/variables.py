@@ -9,6 +9,7 @@ choice of k                     k coordinates in [0, 1], 1 for the choice that i
 """
 
 import re
+from math import isfinite
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -221,6 +222,6 @@ def _finite(name: str, value: Any, what: str, wanted: str) -> float:
         number = float("nan") if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):
         number = float("nan")
-    if not np.isfinite(number):
+    if not isfinite(number):
         raise InputError(f"{what}: {name} is {str(value)[:60]!r}; give {wanted}.")
     return number

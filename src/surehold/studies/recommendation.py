@@ -13,7 +13,7 @@ from optuna.study import Study
 from surehold.errors import InputError
 from surehold.optimization.recommendation import outliers_in_words
 from surehold.studies.dashboard_note import read_note, write_note
-from surehold.studies.history import REACHED, history_of
+from surehold.studies.history import REACHED
 from surehold.studies.sampler import Sampler, direction_of
 
 __all__ = ["RECOMMENDATION", "StudyRecommendation", "find_recommendation", "recommend", "written"]
@@ -102,7 +102,7 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     sign = 1.0 if direction == "maximize" else -1.0
     trials = study.get_trials(deepcopy=False)
     space = sampler.search_space(study)
-    history = history_of(trials, space, outputs=sampler.outputs)
+    history = sampler.history(trials, space)
     with sampler.optimizing(space, history, direction) as optimizer:
         best = optimizer.recommend()
         told = np.flatnonzero(np.isfinite(history.y))

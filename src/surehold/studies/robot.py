@@ -6,7 +6,7 @@ believed dead, is accepted as long as the one that took the trial up again has n
 """
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -18,8 +18,8 @@ from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError, SureholdError, unknown_name
 from surehold.optimization.limits import checked_outputs, limits_of
-from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, history_of, parameters_of
-from surehold.studies.ledger import HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
+from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
+from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
 from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend, written
 from surehold.studies.settings import SETTINGS, StudySettings
 from surehold.studies.stop_rule import StopRule
@@ -33,6 +33,8 @@ __all__ = ["Asked", "NothingToAsk", "RobotStudy"]
 
 _PAUSED: Final = "surehold:paused"  # study attribute: why; None where it is not paused
 _STOP: Final = "surehold:stop"  # study attribute: a `StopRule`
+
+Proposals = Callable[[list[FrozenTrial]], tuple[dict[str, Any], int] | None]
 
 
 class NothingToAsk(SureholdError):
@@ -56,6 +58,8 @@ class Asked:
     """whether it has been handed out before"""
     pose: dict[str, Any] | None = None
     """of the palm in the object's frame, where the study is about a shape that is touched"""
+    behind: int = 0
+    """told answers that the model of this trial did not know, see `surehold.studies.prepared`"""
 
 
 class RobotStudy:
@@ -156,7 +160,9 @@ class RobotStudy:
 
     # --- asking ---------------------------------------------------------------------------------------------------
 
-    def ask(self, worker: str | None = None, *, lifetime: float | None = None) -> Asked:
+    def ask(
+        self, worker: str | None = None, *, lifetime: float | None = None, prepared: Proposals | None = None
+    ) -> Asked:
         """Hand out a trial.
 
         Parameters
@@ -167,6 +173,9 @@ class RobotStudy:
         lifetime
             Seconds for which the worker counts as alive, see `renew`; a trial whose worker is dead is handed out
             again before any new one. None: forever.
+        prepared
+            Gives, of all trials, the parameters of a new one and how many told answers they are behind, or None where
+            the model is to be asked; see `surehold.studies.prepared`.
 
         Raises
         ------
@@ -195,8 +204,10 @@ class RobotStudy:
                 trial = self._ledger.trial(self.study.ask(self.settings.space.distributions).number)
                 self._ledger.hold(trial, holder)
             else:
-                parameters = self._suggested(trials)
+                found = None if prepared is None else prepared(trials)
+                parameters, behind = found or (self._suggested(trials), 0)
                 marks = {HOLDER: holder} | ({} if promise is None else {PROMISE: promise})
+                marks |= {BEHIND: behind} if behind else {}
                 trial = self._ledger.store(TrialState.RUNNING, parameters, marks)
             return self._asked(trial, False)
 
@@ -398,7 +409,7 @@ class RobotStudy:
     def _promise(self, trials: list[FrozenTrial]) -> float | None:
         if self._touched is not None:
             return None
-        history = history_of(trials, self.settings.space, outputs=self.sampler.outputs)
+        history = self.sampler.history(trials, self.settings.space)
         if len(trials) < self.n_initial or not np.isfinite(history.y).any():
             return None
         with self.sampler.optimizing(self.settings.space, history, self.settings.direction) as optimizer:
@@ -407,4 +418,4 @@ class RobotStudy:
     def _asked(self, trial: FrozenTrial, again: bool) -> Asked:
         parameters = {name: trial.params[name] for name in self.settings.space.distributions}
         pose = None if self._touched is None else self._touched.pose(parameters)
-        return Asked(trial.number, parameters, dict(self.settings.units), again, pose)
+        return Asked(trial.number, parameters, dict(self.settings.units), again, pose, trial.user_attrs.get(BEHIND, 0))

@@ -116,6 +116,7 @@ class AskedTrial(BaseModel):
     units: dict[str, str]
     again: bool
     pose: dict[str, Any] | None = None
+    behind: Annotated[int, Field(description="Told answers that its model did not know; 0 unless asks overlap.")] = 0
 
 
 class Taken(BaseModel):

@@ -3,8 +3,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from surehold.grasping.closing.contacts import AROUND, DEPTH, STATIONS, blended, link_samples, palm_samples, pass_share
-from surehold.grasping.object.solids import RoundedBox, signed_distance
+from surehold.grasping.closing.contacts import DEPTH, blended, pass_share
+from surehold.grasping.object.solids import signed_distance
 from surehold.grasping.poses import default_pose
 from surehold.grasping.simulator import Simulator
 
@@ -59,20 +59,6 @@ def test_every_touching_link_is_felt_by_the_skin(graded):
             weights = [w for w, n in zip(grasp.contacts.weights, grasp.contacts.names, strict=True) if n == name]
             assert weights, f"{name} touches, but no sample is near"
             assert max(weights) > 0.6, name
-
-
-def test_samples_lie_on_the_skin_and_point_outwards():
-    radius, length = 0.0065, 0.02
-    rows = link_samples(radius, length, True)
-    foot = np.column_stack([np.zeros((len(rows), 2)), np.clip(rows[:, 2], 0.0, length)])
-    np.testing.assert_allclose(np.linalg.norm(rows[:, :3] - foot, axis=1), radius, atol=1e-12)
-    np.testing.assert_allclose(rows[:, :3] - foot, radius * rows[:, 3:], atol=1e-12)
-    assert len(link_samples(radius, length, False)) == STATIONS * AROUND
-    half = np.array([0.04, 0.0335, 0.015])
-    palm = palm_samples(half, 0.006)
-    distance, gradient = RoundedBox((0.0, 0.0, 0.0), tuple(half), 0.006).signed_distance(palm[:, :3])
-    np.testing.assert_allclose(distance, 0.0, atol=1e-12)
-    np.testing.assert_allclose(gradient, palm[:, 3:], atol=1e-12)
 
 
 def test_a_palm_that_lies_on_the_object_is_felt():

@@ -3,6 +3,7 @@
 import copy
 import importlib.util
 import os
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -11,7 +12,7 @@ import yaml
 
 from surehold.errors import InputError
 from surehold.grasping import GraspChecker, Simulator, default_pose, hand_named
-from surehold.grasping.hand.configuration import HandConfig
+from surehold.grasping.hand.configuration import HandConfig, read_hand_config
 from surehold.grasping.hand.cover import cover_box, cover_mesh
 from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.kinematics import link_ends
@@ -174,7 +175,7 @@ def test_only_contact_links_touch(tmp_path, model):
         ({"preshapes__close__posture": {"range": [1, -1], "joints": {"a1": 1}}}, ("the smaller one first",)),
         ({"preshapes__close__posture": {"range": [-1, 1], "joints": {"zz": 1}}}, ("close.posture 'zz'",)),
         ({"coupling": {"zz": {"follows": "a1"}}}, ("joint of coupling 'zz'",)),
-        ({"coupling": {"b1": {"follows": "b1"}}}, ("which follows too",)),
+        ({"coupling": {"b1": {"follows": "b1"}}}, ("follows itself",)),
         ({"contact_links": ["zz"]}, ("body 'zz' is unknown",)),
         ({"contact_links": []}, ("no geometry that can touch",)),
     ],
@@ -296,3 +297,52 @@ def test_a_pipe_is_no_model(tmp_path):
         load_hand(tmp_path / "hand.xml", HandConfig.model_validate(CONFIG))
     with pytest.raises(InputError, match="is no regular file"):
         load_hand(tmp_path / "hand.xml", tmp_path / "hand.yaml")
+
+
+EXAMPLES = sorted((Path(__file__).parents[3] / "examples" / "hands").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_a_shipped_description_closes_every_finger(path):
+    """Without the models, which are their makers': each finger has a joint that closes or that the model may couple."""
+    described = read_hand_config(path)
+    assert described.name == path.stem
+    for preshape in described.preshapes.values():
+        known = {joint for joints in described.fingers.values() for joint in joints}
+        assert set(preshape.open) | set(preshape.closed) <= known
+        assert set(preshape.closed) - set(described.coupling) == set(preshape.closed)
+    assert len(EXAMPLES) >= 7
+
+
+def test_default_classes_are_resolved(tmp_path):
+    """Ranges and axes of a class, geometries that are only looked at: the same hand as written out."""
+    joint, geom = 'axis="0 1 0" range="0 90"', 'type="capsule" fromto="0 0 .01 0 0 .04" size=".008"'
+    body = '<body pos="{x} 0 0"><joint name="{name}" {joint}/><geom {geom}/>{more}</body>'
+    model = (
+        '<mujoco>{defaults}<worldbody><body name="palm" {child}><geom {box}/>{left}{right}</body></worldbody></mujoco>'
+    )
+    box = 'type="box" size=".02 .04 .01"'
+    hands = []
+    for classes in (False, True):
+        looks = '<geom class="looks"/>' if classes else ""
+        parts = [
+            body.format(x=x, name=name, joint="" if classes else joint, geom="" if classes else geom, more=looks)
+            for x, name in ((-0.03, "a1"), (0.03, "c1"))
+        ]
+        defaults = (
+            f'<default><default class="hand"><joint {joint}/><geom {geom}/>'
+            '<default class="looks"><geom contype="0" conaffinity="0"/></default></default></default>'
+        )
+        text = model.format(
+            defaults=defaults if classes else "",
+            child='childclass="hand"' if classes else "",
+            box=f'class="main" {box}' if classes else box,
+            left=parts[0],
+            right=parts[1],
+        )
+        (tmp_path / "hand.xml").write_text(text)
+        config = described(
+            tmp_path, fingers__left=["a1"], coupling={}, preshapes__close={"closed": {"a1": 1.0, "c1": 1.0}}
+        )
+        hands.append(load_hand(tmp_path / "hand.xml", config))
+    assert all(np.array_equal(a, b) for a, b in zip(*(hand.arrays() for hand in hands), strict=True))

@@ -170,3 +170,28 @@ def test_other_grasp_types_leave_fingers_at_rest(name):
 def test_unknown_preshape_is_explained():
     with pytest.raises(InputError, match="power, tripod, pinch"):
         Simulator(preshape="hook")
+
+
+#: axis of the first joint and direction of the thumb at 0 in iKin's frame of the left palm (robotology/icub-main,
+#: iKinFwd.cpp, iCubFinger): x as here, y and z the other way
+IKIN_AXES = {
+    "index": (0.0, -0.087156, 0.996195),
+    "ring": (0.0, -0.0872, -0.9962),
+    "little": (0.0, -0.0872, -0.9962),
+    "thumb": (0.875792, 0.476873, 0.074703),
+}
+IKIN_THUMB = (0.478469, -0.878095, 0.004)
+
+
+def degrees_between(a, b):
+    return np.degrees(np.arccos(min(abs(np.dot(a, b)) / np.linalg.norm(a) / np.linalg.norm(b), 1.0)))
+
+
+def test_fingers_tilt_as_in_the_robots_own_kinematics():
+    """Of two public sources that contradict each other by 7 degrees, the hand follows the robot's own library."""
+    hand = icub_left_hand()
+    for finger, axis in IKIN_AXES.items():
+        ours = hand.bases[hand.finger_names.index(finger), :, 2]
+        assert degrees_between(ours, np.array(axis) * [1, -1, -1]) < 0.7, finger
+    near, far = link_ends(hand.bases, hand.chains, np.zeros((5, 4)))[4 * 4 + 1]
+    assert degrees_between(far - near, np.array(IKIN_THUMB) * [1, -1, -1]) < 0.6

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
+from surehold.grasping.object.distance_field import distance_field_of
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.shape.point_cloud import cleaned
 from surehold.grasping.shape.views import camera_towards, half_view, surface_points
@@ -84,13 +85,58 @@ def test_what_no_shape_can_be_learnt_from_is_said_in_one_line(mug, change, said)
     assert "\n" not in str(error.value)
 
 
+def fingers(n, rng):
+    """Two fingers on both sides of the view, 3 to 10 cm before the camera."""
+    view = -CAMERA / np.linalg.norm(CAMERA)
+    side = np.cross(view, [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side)
+    turn, along = rng.uniform(0.0, 2.0 * np.pi, n), rng.uniform(0.03, 0.10, n)
+    round_ = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(side, view)
+    return CAMERA + along[:, None] * view + 0.008 * round_ + np.where(np.arange(n) % 2, 0.012, -0.012)[:, None] * side
+
+
+@pytest.mark.parametrize("n", [60, 1000])
+def test_the_fingers_before_a_camera_on_the_hand_are_left_out(mug, n):
+    own = fingers(n, np.random.default_rng(5))
+    cloud = cleaned(np.vstack([mug, own]), camera=CAMERA)
+    assert (
+        any("of the camera, as of a hand, were left out" in note for note in cloud.notes) or n == 60
+    )  # or as outliers
+    assert np.abs(distance_field_of(shipped_object("mug")).distance(cloud.points)).max() < 0.006
+
+
+def test_a_hand_that_is_most_of_the_cloud_is_refused(mug):
+    with pytest.raises(InputError, match="take out those of the hand that carries the camera") as error:
+        cleaned(np.vstack([mug[::4], fingers(2000, np.random.default_rng(5))]), camera=CAMERA)
+    assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="without the hand's own points"):
+        cleaned(np.vstack([mug, fingers(2000, np.random.default_rng(5))]))
+
+
 def test_a_camera_among_the_points_is_refused(mug):
     with pytest.raises(InputError, match="lies among the points"):
         cleaned(mug, camera=mug.mean(axis=0))
 
 
-def test_millions_of_points_are_read_in_part():
-    many = surface_points(shipped_object("mug"), 1_000_000, np.random.default_rng(4))[0]
+def test_ten_million_points_are_thinned_before_anything_else():
+    rng = np.random.default_rng(4)
+    places = surface_points(shipped_object("mug"), 400_000, rng)[0].astype(np.float32)
+    many = np.repeat(places, 25, axis=0)
+    many += rng.normal(0.0, 0.0005, many.shape).astype(np.float32)
+    many[:20_000] = rng.uniform(-0.3, 0.3, (20_000, 3))  # single points in the air
     cloud = cleaned(many)
-    assert any("each 17th was taken" in note for note in cloud.notes)
+    assert cloud.notes[0].startswith("of 10,000,000 points ")
     assert len(cloud.points) <= 2500
+    off = np.abs(distance_field_of(shipped_object("mug")).distance(cloud.points))
+    assert np.quantile(off, 0.99) < 0.002
+    assert off.mean() < 0.0006
+
+
+def test_of_many_points_those_of_a_small_part_are_not_lost():
+    rng = np.random.default_rng(6)
+    part = surface_points(shipped_object("mug"), 3_000, rng)[0]
+    dense = np.column_stack([rng.uniform(-0.3, 0.3, (400_000, 2)), rng.normal(0.0, 0.0003, 400_000)])
+    cloud = cleaned(np.vstack([dense, part]), camera=CAMERA)
+    assert cloud.table is not None
+    assert len(cloud.points) > 1500
+    assert np.ptp(cloud.points, axis=0) == pytest.approx(np.ptp(part, axis=0), abs=0.01)

@@ -4,10 +4,11 @@ from scipy.optimize import check_grad
 from scipy.special import log_ndtr, ndtr
 
 from surehold.optimization.box import Box
-from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel, propagate
+from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.surrogates.success.propagation import propagated
 
 RNG = np.random.default_rng(0)
 X = RNG.random((24, 2))
@@ -30,11 +31,10 @@ def test_probability_and_evidence_against_sampling_the_exact_posterior(n, s2):
     f = np.random.default_rng(1).multivariate_normal(np.zeros(n + 3), joint, 400_000)
     weights = np.exp(log_ndtr(t * f[:, :n]).sum(axis=1))
     expected = (weights[:, None] * ndtr(f[:, n:])).sum(axis=0) / weights.sum()
-    sites = propagate(joint[:n, :n], t)
+    sites = propagated(joint[:n, :n], OK[:n].astype(float), np.ones(n), np.full(n, 1e-6), np.zeros(n))
     k = joint[n:, :n]
-    S = np.diag(np.maximum(sites.root, 1e-9) ** -2.0)
-    v = s2 + 1.0 - np.einsum("qi,ij,qj->q", k, np.linalg.inv(joint[:n, :n] + S), k)
-    assert ndtr(k @ sites.a / np.sqrt(1.0 + v)) == pytest.approx(expected, abs=0.01)
+    v = s2 + 1.0 - np.square(k @ sites.half.T).sum(axis=1)
+    assert ndtr(k @ sites.alpha / np.sqrt(1.0 + v)) == pytest.approx(expected, abs=0.01)
     assert sites.log_evidence == pytest.approx(np.log(weights.mean()), abs=0.05)  # EP: 0.024 off
 
 

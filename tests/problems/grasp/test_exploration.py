@@ -9,7 +9,7 @@ from surehold.errors import InputError
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.poses import Pose
 from surehold.grasping.simulator import Simulator
-from surehold.problems.grasp.exploration import Exploration, belief_of_box
+from surehold.problems.grasp.exploration import Exploration, belief_of_box, belief_of_size
 from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.grasp.shape_loss import shape_loss
 from surehold.problems.grasp.told_contacts import contacts_of_file
@@ -57,6 +57,24 @@ def test_the_surface_moves_to_what_was_felt(explored):
     assert np.all(run.belief.surface.deviation(points) < 0.3 * before.std)
 
 
+def test_a_large_box_costs_no_more_than_a_small_one():
+    large = belief_of_size([0.9, 0.7, 0.4])
+    assert np.prod(large.grid.shape) < 1.3 * 100_000  # numbers of nodes are rounded up
+    assert large.grid.cell > belief_of_size([0.06, 0.06, 0.1]).grid.cell == 0.004
+
+
+def test_space_that_is_swept_again_and_again_is_kept_once(explored):
+    run, touches = explored
+    again = Exploration(PROBLEM, belief_of_box(BOTTLE, cell=0.006), NOISE, shapes=2, seed=1)
+    swept = touches[0].observations
+    for _ in range(3):
+        again.tell(run.X[0], 0.0, swept)
+    once = Exploration(PROBLEM, belief_of_box(BOTTLE, cell=0.006), NOISE, shapes=2, seed=1)
+    once.tell(run.X[0], 0.0, swept)
+    assert len(swept.free) > 0
+    assert np.array_equal(again.belief.free, once.belief.free)
+
+
 def test_the_next_trial_follows_from_what_was_told(explored):
     run, touches = explored
     again = Exploration(PROBLEM, belief_of_box(BOTTLE, cell=0.006), NOISE, shapes=2, seed=1)
@@ -96,13 +114,16 @@ def test_a_hand_that_meets_the_object_on_its_way_feels_it():
 
 def test_value_over_draws_is_the_mean_over_simulators():
     wider = replace(BOTTLE, friction=0.9)
-    unknown = PROBLEM.on(replace(BOTTLE, draws=(BOTTLE, wider)))
+    both = replace(BOTTLE, draws=(BOTTLE, wider))
+    unknown = GraspProblem("bottle", variables=PROBLEM.box.names, plan="shapes").on(both)
     x = a_grasp()
     expected = [Simulator(obj=obj).grasp(PROBLEM.pose(x), PROBLEM.posture(x)).quality for obj in (BOTTLE, wider)]
     assert expected[0] != expected[1]
     assert unknown.over_shapes(x).tolist() == expected
     assert unknown(x) == pytest.approx(np.mean(expected), abs=1e-15)
-    assert PROBLEM(x) == expected[0]
+    assert PROBLEM.on(both)(x) == expected[0]  # by default that on the mean shape
+    with pytest.raises(InputError, match="did you mean 'shapes'"):
+        GraspProblem("bottle", plan="shape")
 
 
 def test_losses_sum_to_what_is_lost():

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CLOSED", "Hand", "HandModel", "Preshape", "chain_row"]
+__all__ = ["CLOSED", "Hand", "HandModel", "LinkBox", "Preshape", "chain_row"]
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,14 @@ class Preshape(NamedTuple):
     s1_tries: tuple[float, ...]  #: values that the search of default poses tries
     further: tuple[Array, ...] = ()  #: of further amplitudes s2, s3, ..: (f, j) each, as `posture`
     further_ranges: tuple[tuple[float, float], ...] = ()  #: their ranges
+
+
+class LinkBox(NamedTuple):
+    """A box that fingers carry, filled by the capsules of some links: they close, its faces feel."""
+
+    links: tuple[int, ...]  #: numbers of these links
+    pose: Array  #: (3, 4) of the box in the frame of the joint that moves them
+    half: Array  #: (3,) half extents [m]
 
 
 class HandModel(NamedTuple):
@@ -67,6 +75,7 @@ class Hand:
     link_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index distal"
     joint_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index_distal"; "" for one that does not move
     preshapes: Mapping[str, Preshape] = field(repr=False)  #: grasp types; the first one is the default
+    boxes: tuple[LinkBox, ...] = field(default=(), repr=False)  #: links with flat faces
     finger_force: float = 8.0  #: what a stretched finger can exert at its tip [N]; the check by physics takes it
     #: where the hand was read from; None for the built-in ones
     model: HandModel | None = field(default=None, repr=False)
@@ -88,7 +97,7 @@ class Hand:
         shapes = [part for preshape in self.preshapes.values() for part in (np.hstack(preshape[:3]), preshape[5])]
         geometry = (self.bases, self.chains, self.radii, self.lower, self.upper, self.palm_poses)
         rest = (self.palm_half_extents, self.palm_roundings, self.grasp_center, *map(np.asarray, shapes))
-        return geometry + rest
+        return geometry + rest + tuple(np.column_stack([box.pose, box.half]) for box in self.boxes)
 
     def reach(self) -> Array:
         """Return (f, j, j): an upper bound of the speed of link k when joint i <= k moves at 1 [m/rad, or 1 in m/m].

@@ -1,9 +1,9 @@
 """A point cloud made ready to learn a shape from: cleaned, thinned, with normals and noise.
 
-In this order: points that are not finite are dropped; the unit is checked; of millions of points a regular part is
-taken; a table under the object is found and taken off; points far from their neighbors are dropped, and groups of a few
-points that lie apart; a second object is refused; the rest is thinned to cubes of equal size, whose means have less
-noise; the noise is measured as the scatter about local planes.
+In this order: points that are not finite are dropped; of many an even part is taken, so that what follows costs the
+same for ten million; the unit is checked; a table under the object is found and taken off; points far from their
+neighbors are dropped, and groups of a few points that lie apart; a second object is refused; the rest is thinned to
+cubes of equal size, whose means have less noise; the noise is measured as the scatter about local planes.
 Distances to neighbors are those of SciPy's k-d tree.
 """
 
@@ -20,7 +20,9 @@ __all__ = ["MOST_POINTS", "PointCloud", "Table", "cleaned"]
 Array = NDArray[np.float64]
 
 MOST_POINTS: Final = 2500  #: from which a surface is learnt; more are thinned to it: dense algebra costs their cube
-_MOST_READ: Final = 60_000  # points that are looked at; of more, each n-th
+_MOST_READ: Final = 60_000  # points that are looked at; of more, as many in each cube of a grid
+_AT_ONCE: Final = 1_000_000  # points that are put into cubes at once
+_CUBES: Final = 64  # edges of these cubes in the extent of the points: wider than the noise, finer than a part
 _LEAST_POINTS: Final = 20
 _LARGEST, _SMALLEST = 0.6, 0.005  # extent of what a hand can grasp [m]
 _NEIGHBORS: Final = 12
@@ -85,9 +87,8 @@ def cleaned(
         points = points[finite]
     _enough(points, "finite ")
     if len(points) > _MOST_READ:
-        step = -(-len(points) // _MOST_READ)
-        notes.append(f"of {len(points):,} points each {step}th was taken")
-        points = points[::step]
+        count, points = len(points), _even_part(points)
+        notes.append(f"of {count:,} points {len(points):,} were taken, evenly")
     points = _without_twins(points)
     _enough(points, "different ")
     _check_unit(points[:, :3])
@@ -144,6 +145,26 @@ def _check_unit(points: Array) -> None:
         raise InputError(f"the cloud spans {1e3 * size:.3g} mm; give its --unit: mm, cm, m or in.")
 
 
+def _even_part(points: Array) -> Array:
+    """Return about `_MOST_READ` of the points, all of those of sparse places and as many of each of the dense ones."""
+    low, high = np.quantile(points[:: len(points) // _MOST_READ, :3], [0.01, 0.99], axis=0)
+    edge = max(float((high - low).max()) / _CUBES, 1e-9)
+    side = _CUBES + 32  # with room on both sides; what lies farther out counts to the outermost cubes
+    parts = []
+    for start in range(0, len(points), _AT_ONCE):
+        steps = np.floor((points[start : start + _AT_ONCE, :3] - low) / edge) + 16.0
+        i, j, k = np.clip(steps, 0, side - 1).astype(np.int32).T
+        parts.append((i * side + j) * side + k)
+    cube = np.concatenate(parts)
+    count = np.bincount(cube)
+    ordered = np.sort(count[count > 0])
+    before = np.cumsum(ordered) - ordered
+    left = len(ordered) - np.arange(len(ordered))  # cubes that hold as many or more
+    k = int(np.searchsorted(before + left * ordered, _MOST_READ))
+    most = (_MOST_READ - before[k]) / left[k]  # of a cube
+    return points[np.random.default_rng(0).random(len(points)) < most / count[cube]]
+
+
 def _without_twins(points: Array) -> Array:
     """Return the points without exact repetitions, in their order."""
     _, first = np.unique(points[:, :3], axis=0, return_index=True)
@@ -197,13 +218,14 @@ def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Ar
     """Return the points without outliers and small groups.
 
     A part that hides another tears a cloud apart, but not the camera's image of it: groups are of one object if they
-    lie beside each other as the camera sees them.
+    lie beside each other as the camera sees them, and not farther apart than the larger is long: the hand that carries
+    the camera is. What is less than half as far from the camera as the object is left out.
 
     Raises
     ------
     InputError
-        If a second group is a fifth as large as the first, or larger, and lies apart; or if what is left is too large
-        to be grasped.
+        If a second group is a fifth as large as the first, or larger, and lies apart; if the first is less than half as
+        far from the camera as a second, as the hand that carries it is; or if what is left is too large to be grasped.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -225,26 +247,37 @@ def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Ar
     sizes = np.bincount(group)
     order = np.argsort(-sizes, kind="stable")
     largest = group == order[0]
-    seen = points[:, :3]
+    seen, far = points[:, :3], np.ones(len(points))
     if camera is not None:  # moved along their rays to one distance
         ray = seen - camera
         far = np.linalg.norm(ray, axis=1)
         seen = ray * (np.median(far) / far)[:, None]
-    first = KDTree(seen[largest])
-    kept = largest.copy()
+    first, place = KDTree(seen[largest]), KDTree(points[largest, :3])
+    extent = float(np.ptp(points[largest, :3], axis=0).max())
+    kept, carried = largest.copy(), np.zeros(len(points), dtype=bool)
     for number in order[1:]:
         mine = group == number
-        gap = float(first.query(seen[mine])[0].min())
-        if gap < _APART:
+        gap, way = (float(tree.query(rows[mine])[0].min()) for tree, rows in ((first, seen), (place, points[:, :3])))
+        if gap < _APART and way < extent:
             kept |= mine
+        elif far[mine].max() < 0.5 * far[largest].min():
+            carried |= mine
+        elif far[largest].max() < 0.5 * far[mine].min() and sizes[number] >= 0.05 * sizes[order[0]]:
+            raise InputError(
+                f"{np.sum(largest):,} points within {1e3 * far[largest].max():.0f} mm of the camera stand before "
+                f"{sizes[number]:,} others; take out those of the hand that carries the camera, or give one object."
+            )
         elif sizes[number] >= 0.2 * sizes[order[0]]:
             raise InputError(
-                f"the cloud holds two objects of {sizes[order[0]]:,} and {sizes[number]:,} points, "
-                f"{1e3 * gap:.0f} mm apart; give one of them."
+                f"the cloud holds two objects of {sizes[order[0]]:,} and {sizes[number]:,} points, {1e3 * way:.0f} mm "
+                "apart; give one of them, without the hand's own points."
             )
-    if not np.all(kept):
-        notes.append(f"{int(np.sum(~kept)):,} points apart from the object were left out")
-        points = points[kept]
+    if np.any(carried):
+        reach = 1e3 * far[carried].max()
+        notes.append(f"{np.sum(carried):,} points within {reach:.0f} mm of the camera, as of a hand, were left out")
+    if not np.all(kept | carried):
+        notes.append(f"{np.sum(~kept & ~carried):,} points apart from the object were left out")
+    points = points[kept]
     size = float(np.ptp(points[:, :3], axis=0).max())
     if size > _LARGEST:
         raise InputError(

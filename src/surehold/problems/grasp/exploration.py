@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.shape.belief import ShapeBelief, grid_of
-from surehold.grasping.shape.implicit_surface import Observations, surface_of
+from surehold.grasping.shape.implicit_surface import Observations, spaced, surface_of
 from surehold.grasping.shape.prior import PriorShape
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.grasp.problem import GraspProblem
@@ -39,7 +39,10 @@ _STEP: Final = 0.06  # of these, in widths of the box
 _ANSWERS: Final = 6  # that are compared under the hand noise
 _DISTURBED: Final = 12
 _SPREAD: Final = (0.25, 0.7)  # of the shape about the box: deviation and length scale, in mean half extents
-_CELL: Final = 0.004  # m
+_CELL: Final = 0.004  # m, of a grid of at most
+_NODES: Final = 100_000  # nodes: each trial makes some shapes anew
+_FREE_SPACING: Final = 0.008  # free points in the same cube of this edge count once [m]
+_GROWTH: Final = 1.0  # of the grid beyond the box, in deviations: what is told of a box is nearly right
 
 
 class ExploredGrasp(NamedTuple):
@@ -74,7 +77,8 @@ def belief_of_size(edges: Sequence[float], name: str = "box", mass: float | None
 def _of_prior(box: PriorShape, cell: float, name: str, mass: float | None, friction: float) -> ShapeBelief:
     size = float(np.exp(np.mean(np.log(box.half))))
     surface = surface_of(box, Observations(), _SPREAD[0] * size, _SPREAD[1] * size)
-    return ShapeBelief(surface, grid_of(surface, cell), name, mass, friction)
+    grid = grid_of(surface, cell, _GROWTH, _NODES)
+    return ShapeBelief(surface, grid, name, mass, friction)
 
 
 class Exploration:
@@ -94,8 +98,6 @@ class Exploration:
         Draws of the shape, B.
     seed
         Of all draws.
-    scaled
-        Whether what is told may be in another unit than the problem's quality; it is brought to it by least squares.
 
     Raises
     ------
@@ -111,17 +113,15 @@ class Exploration:
         goal: str = "grasp",
         shapes: int = 4,
         seed: int = 0,
-        scaled: bool = False,
     ):
         if goal not in GOALS:
             raise unknown_name("goal", goal, GOALS)
         self._problem, self._noise, self._goal, self._shapes, self._seed = problem, noise, goal, shapes, seed
-        self._scaled = scaled
         self.belief = belief
         self.X: Array = np.empty((0, problem.box.dimension))  #: trials told, in the units of the box
         self.y: Array = np.empty(0)  #: their qualities
         self._felt = belief.surface.observations  # all of it, bounds apart
-        self._free: Array = np.empty((0, 4))
+        self._seen, self._free = belief.free, np.empty((0, 4))
 
     def ask(self, pending: Array | None = None) -> Array:
         """Return the next trial (d,); `pending` (p, d) are under way."""
@@ -149,31 +149,25 @@ class Exploration:
         for each in felt:
             self._felt = self._felt + replace(each, free=np.empty((0, 4)))
             self._free = np.vstack([self._free, each.free])  # bounds become active anew: what is learnt may free them
+        self._free = self._free[spaced(self._free[:, :3], _FREE_SPACING)]
         if felt:
             surface = self.belief.surface
             told = replace(self._felt, free=self._free)
-            self.belief = self.belief.with_surface(surface_of(surface.prior, told, surface.std, surface.length))
+            learnt = surface_of(surface.prior, told, surface.std, surface.length)
+            self.belief = replace(self.belief, surface=learnt, free=np.vstack([self._seen, self._free]))
 
     def recommend(self, tried: bool = False) -> ExploredGrasp:
         """Return the grasp that is expected to hold best under shape and hand noise; `tried`: of the trials told."""
         imagined = self._imagined()
         candidates = self.X if tried else np.vstack([self.X, self._candidates()])
         first = np.array([imagined.over_shapes(x).mean() for x in candidates])
-        # A trial was made on the true shape: its own value counts as much as all that is imagined.
-        off = np.zeros(len(candidates))
-        off[: len(self.X)] = 0.5 * (self._worth(first[: len(self.X)]) - first[: len(self.X)])
         answers = []
-        for k in np.argsort(-(first + off), kind="stable")[:_ANSWERS]:
+        for k in np.argsort(-first, kind="stable")[:_ANSWERS]:
             points = perturbed_points(candidates[k], self._problem.box, self._noise, _DISTURBED, self._seed)
-            values = np.array([imagined.over_shapes(point) for point in points]) + off[k]
+            values = np.array([imagined.over_shapes(point) for point in points])
             mean, std = float(values.mean()), float(values.std())
             answers.append(ExploredGrasp(candidates[k], mean, std, float(np.quantile(values, 0.05))))
         return max(answers, key=lambda answer: answer.mean)
-
-    def _worth(self, believed: Array) -> Array:
-        """Return what was told in the unit of the problem's quality; `believed` (n,) is that of the same trials."""
-        square = float(self.y @ self.y)
-        return self.y * (max(float(believed @ self.y), 0.0) / square if self._scaled and square > 0.0 else 1.0)
 
     def _imagined(self) -> GraspProblem:
         """Return the problem on the shapes that are possible now."""

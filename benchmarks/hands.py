@@ -1,0 +1,131 @@
+"""Do hands from public models grasp? `python -m benchmarks.hands --models FOLDER --rows FILE [--write TABLE.md]`.
+
+For a hand and an object: 120 random poses before the facet (along the fingers, across them, standoff, posture), 40 more
+about the best three; of the three best then, the one whose epsilon is highest on average over 20 draws of input noise
+(3 % of each range) is the grasp. It is squeezed, weighed and shaken in MuJoCo, and so are these 20 executions.
+
+FOLDER holds the models: github.com/dexsuite/dex-urdf as `dex-urdf`, github.com/a-price/robotiq_arg85_description under
+its own name. Hands whose model or package is not there are left out. A row is written for each pair: it goes on where
+it was.
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+
+from surehold.errors import InputError
+from surehold.grasping import Simulator, default_pose, hand_named
+from surehold.grasping.hand.files import load_hand
+from surehold.grasping.hand.synergy import preshape_of
+from surehold.grasping.physics.check import GraspChecker
+from surehold.optimization.numerics.threads import single_threaded
+
+DESCRIPTIONS = Path(__file__).parents[1] / "examples" / "hands"
+MODELS = {
+    "allegro": "dex-urdf/robots/hands/allegro_hand/allegro_hand_right.urdf",
+    "leap": "dex-urdf/robots/hands/leap_hand/leap_hand_right.urdf",
+    "inspire": "dex-urdf/robots/hands/inspire_hand/inspire_hand_right.urdf",
+    "ability": "dex-urdf/robots/hands/ability_hand/ability_hand_right.urdf",
+    "svh": "dex-urdf/robots/hands/schunk_hand/schunk_svh_hand_right.urdf",
+    "barrett": "dex-urdf/robots/hands/barrett_hand/bhand_model.urdf",
+    "robotiq-2f85": "robotiq_arg85_description/robots/robotiq_arg85_description.URDF",
+    "shadow": "",
+    "panda": "",
+    "icub-left": "",
+}
+FACET = "right-front"
+RANGES = np.array([(-0.04, 0.04), (-0.03, 0.03), (-0.015, 0.045)])  # dx, dy, standoff [m]
+NOISE, EXECUTIONS = 0.03, 20
+RANDOM, AROUND, BEST = 120, 40, 3
+
+
+def hand_of(name, models):
+    if not MODELS[name]:
+        return hand_named(name)
+    return load_hand(models / MODELS[name], DESCRIPTIONS / f"{name}.yaml")
+
+
+def row_of(hand, obj):
+    """Return the best grasp found and how it does under noise."""
+    simulator = Simulator(hand, obj)
+    ranges = np.vstack([RANGES, preshape_of(hand).s1_useful])
+
+    def grasp(unit):
+        dx, dy, standoff, s1 = ranges[:, 0] + unit * np.ptp(ranges, axis=1)
+        return simulator.grasp(default_pose(hand, simulator.object, FACET, standoff, (dx, dy, 0, 0, 0, 0)), s1)
+
+    rng = np.random.default_rng(0)
+    units = rng.random((RANDOM, 4))
+    grasp(units[0])  # compiled
+    started = time.process_time()
+    values = np.array([grasp(unit).quality for unit in units])
+    about = units[np.argsort(-values)[:BEST]][rng.integers(BEST, size=AROUND)]
+    units = np.vstack([units, np.clip(about + 0.05 * rng.normal(size=about.shape), 0.0, 1.0)])
+    values = np.append(values, [grasp(unit).quality for unit in units[RANDOM:]])
+    seconds = (time.process_time() - started) / len(units)
+    strayed = NOISE * rng.normal(size=(EXECUTIONS, 4))
+    executions = [[grasp(unit + stray) for stray in strayed] for unit in units[np.argsort(-values)[:BEST]]]
+    robust = [float(np.mean([max(g.quality, 0.0) for g in mine])) for mine in executions]
+    best = int(np.argmax(robust))
+    chosen = grasp(units[np.argsort(-values)[best]])
+    checker = GraspChecker(simulator)
+    started = time.process_time()
+    verdict = checker.check(chosen).verdict
+    held = int(np.sum(checker.held(executions[best])))
+    return {
+        "closed": float(np.mean(values > 0.0)),
+        "epsilon": chosen.quality,
+        "robust": robust[best],
+        "verdict": verdict,
+        "held": held,
+        "trial": seconds,
+        "check": (time.process_time() - started) / (EXECUTIONS + 1),
+        "force": checker.finger_force,
+    }
+
+
+def table(rows):
+    yield "| hand | object | in force closure | epsilon | under noise | verdict | held of 20 | trial | check |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for row in sorted(rows, key=lambda row: (list(MODELS).index(row["hand"]), row["object"])):
+        yield (
+            f"| {row['hand']} | {row['object']} | {100 * row['closed']:.0f} % | {row['epsilon']:.3f} | "
+            f"{row['robust']:.3f} | {row['verdict']} | {row['held']} | {1e3 * row['trial']:.1f} ms | "
+            f"{row['check']:.2f} s |"
+        )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--models", type=Path, required=True)
+    parser.add_argument("--rows", type=Path, required=True)
+    parser.add_argument("--hands", nargs="*", default=list(MODELS))
+    parser.add_argument("--objects", nargs="*", default=["bottle", "mug"])
+    parser.add_argument("--write", type=Path, default=None)
+    arguments = parser.parse_args()
+    rows = [json.loads(line) for line in arguments.rows.read_text().splitlines()] if arguments.rows.exists() else []
+    for obj in arguments.objects:
+        for name in arguments.hands:
+            if any((row["hand"], row["object"]) == (name, obj) for row in rows):
+                continue
+            try:
+                hand = hand_of(name, arguments.models)
+            except InputError as error:
+                print(f"{name} is left out: {error}", flush=True)
+                continue
+            rows.append({"hand": name, "object": obj, **row_of(hand, obj)})
+            with arguments.rows.open("a") as file:
+                file.write(json.dumps(rows[-1]) + "\n")
+            print(*list(table(rows[-1:]))[2:], flush=True)
+    lines = list(table(rows))
+    print(*lines, sep="\n")
+    if arguments.write is not None:
+        arguments.write.write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    with single_threaded():
+        main()
