@@ -249,7 +249,11 @@ def test_a_run_without_any_grasp_says_so_first(here, capsys):
     assert out.index("None of 3 trials") < out.index("pose")
     page = (here / "slippery" / "report.html").read_text(encoding="utf-8")
     assert '<p class="headline">None of 3 trials succeeded' in page
-    assert "No success: " in page
+    assert "No success: the highest trial" in page
+    assert "no success: the highest trial" in out
+    told = re.sub(r"<script.*?</script>|<style.*?</style>|<dl.*?</dl>", "", page, flags=re.DOTALL)
+    assert "ecommended" not in told + out
+    assert "Recommended" not in page
 
 
 def test_doctor_compiles_for_images(capsys, monkeypatch):

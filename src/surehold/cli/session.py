@@ -314,9 +314,7 @@ def _show(report: RunReport, path: Path, seconds: float, console: Console) -> No
     table = Table(title=None, show_edge=False, pad_edge=False, header_style="bold")
     table.add_column("")
     for candidate in report.candidates:
-        alone = len(report.candidates) == 1
-        same = alone and not report.counted
-        table.add_column(f"{report.extreme} observed = recommended" if same else candidate.label, overflow="fold")
+        table.add_column(report.called(candidate), overflow="fold")
     for name, cells in page.table_rows(report):
         table.add_row(_plain(name), *(_plain(cell) for cell in cells))
     told = verdict(report)

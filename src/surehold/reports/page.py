@@ -64,7 +64,7 @@ def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
             words=glossary(report),
             settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
             trials=trials,
-            **scene_context(shown, [_scene_note(c) for c in shown], [_label(report, c) for c in shown]),
+            **scene_context(shown, [_scene_note(report, c) for c in shown], [_label(report, c) for c in shown]),
         )
     )
 
@@ -131,11 +131,9 @@ def _vendored(name: str) -> str:
 def _label(report: RunReport, candidate: Candidate) -> dict[str, str]:
     alone = len(report.candidates) == 1
     role = "high" if candidate is report.observed and not alone else "answer"
-    text = candidate.label.capitalize()
-    if alone and not report.counted:
-        text = f"{report.extreme.capitalize()} observed = recommended"
-    if not report.succeeded:
-        role, text = "high", f"No success: {f'the {report.extreme} trial' if alone else candidate.label}"
+    role = role if report.succeeded else "high"
+    text = report.called(candidate)
+    text = text[0].upper() + text[1:]
     return {"role": role, "mark": "▲" if role == "high" else "●", "text": text}
 
 
@@ -149,9 +147,10 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         tag = "refused" if label["role"] == "high" else "holds better"
     svg = None
     if shaken and not report.counted:
+        what = f"the {candidate.label} point" if report.succeeded else report.called(candidate)
         name = f"shake-{label['role']}"
         text = (
-            f"Histogram of {candidate.values.size} re-queries of the {candidate.label} point: mean "
+            f"Histogram of {candidate.values.size} re-queries of {what}: mean "
             f"{number(candidate.mean)}, worst {number(candidate.worst)}"
         )
         svg = Markup(figures.inline_svg(drawings[figures.shake_name(candidate)], name, text))
@@ -174,8 +173,9 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
     }
 
 
-def _scene_note(candidate: Candidate) -> str:
-    parts = [f"{candidate.label.capitalize()}: {number(candidate.quality)} when hit exactly"]
+def _scene_note(report: RunReport, candidate: Candidate) -> str:
+    name = candidate.label if report.succeeded else report.called(candidate)
+    parts = [f"{name[0].upper()}{name[1:]}: {number(candidate.quality)} when hit exactly"]
     if candidate.values.size:
         parts.append(f"{number(candidate.mean)} on average and {number(candidate.worst)} at worst when off")
     if candidate.scene is not None and candidate.scene.contacts is not None:
@@ -286,7 +286,7 @@ def _trials(report: RunReport) -> list[dict[str, Any]]:
             notes.append(f"{report.extreme} observed")
             style = "best"
         if report.recommended.trial == i:
-            notes.append("recommended")
+            notes.append("recommended" if report.succeeded else "shown")
             style = "chosen"
         failed = not np.isfinite(y)
         rows.append(
