@@ -1,11 +1,11 @@
 """The written description says what was proposed, whatever the names are."""
 
 import pytest
-from hand_models import SLIDING, five_fingers, linkage
 
 from surehold.grasping.hand.configuration import ModelFile, read_hand_config
 from surehold.grasping.hand.description_file import description_text
 from surehold.grasping.hand.proposal import propose_hand
+from tests.grasping.hand_models import SLIDING, five_fingers, linkage
 
 
 @pytest.mark.parametrize(
