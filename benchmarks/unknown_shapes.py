@@ -7,7 +7,7 @@ shape    distance of the true surface to the one believed [mm], mean and 95 %, o
          chosen on these
 grasp    a grasp is planned on a half view (1,000 points, 1 mm): on 8 draws of the shape, on the mean surface alone, and
          on the cloud mirrored and believed; then it is queried 200 times on the true shape under input noise
-explore  from a box: the true worth of the answer after 20, 35 and 50 trials, beside optimization without a shape
+explore  from a box: the true worth of the answer after 20, 40 and 80 trials, beside optimization without a shape
 time     of an update of the shape with 200 contacts
 
 Every finished case is a line of the rows' file: a benchmark that is stopped goes on where it was. Cases are numbered by
@@ -32,12 +32,14 @@ from surehold.grasping.shape.completion import SPREAD, belief_of_cloud
 from surehold.grasping.shape.implicit_surface import Observations
 from surehold.grasping.shape.point_cloud import cleaned
 from surehold.grasping.shape.views import camera_towards, half_view, hidden_mask, surface_points
+from surehold.problems.grasp.default_poses import default_facet
 from surehold.problems.grasp.exploration import Exploration, belief_of_box
 from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.grasp.touch import touch_trial
 
 NOISE = sh.InputNoise.unit(0.03)
 TRIALS, INITIAL = 30, 15
+READ_OFF = (20, 40, 80)  # trials after which an exploration is asked for its answer
 
 
 def solid_object(name, solids):
@@ -113,8 +115,8 @@ def shape(objects, args):
 
 
 def grasp(objects, args):
-    for name, obj in objects.items():
-        for view in range(args.first, args.first + args.views):
+    for view in range(args.first, args.first + args.views):
+        for name, obj in objects.items():
             key = {"object": name, "view": view}
             if known(args, key):
                 continue
@@ -124,7 +126,7 @@ def grasp(objects, args):
             trusted = (
                 belief if belief.surface.prior is belief.surface.first else belief.with_surface(belief.surface.prior)
             )
-            problem = GraspProblem(mean)
+            problem = GraspProblem(mean, default_facet(obj), plan="shapes")
             real = problem.on(obj)
             row = {}
             for method, body in (
@@ -145,8 +147,8 @@ def grasp(objects, args):
 
 def explore(objects, args):
     variables = ("dx", "dy", "dz", "rx", "ry", "rz", "s1")
-    for name, obj in objects.items():
-        for seed in range(args.first, args.first + args.views):
+    for seed in range(args.first, args.first + args.views):
+        for name, obj in objects.items():
             key = {"object": name, "seed": seed}
             if known(args, key):
                 continue
@@ -160,18 +162,18 @@ def explore(objects, args):
             run = Exploration(problem, belief, NOISE, seed=seed)
             row = {}
             started = time.process_time()
-            for k in range(50):
+            for k in range(80):
                 x = run.ask()
                 touch = touch_trial(real.simulator, problem.pose(x), problem.posture(x))
                 run.tell(x, touch.grasp.quality, touch.observations)
-                if k + 1 in (20, 35, 50):
+                if k + 1 in READ_OFF:
                     row[f"explored {k + 1}"] = true(run.recommend().x)
             row["cpu"] = time.process_time() - started
             optimizer = sh.Optimizer(problem.box, input_noise=NOISE, seed=seed, n_initial=20)
             for k in range(100):
                 x = optimizer.ask()
                 optimizer.tell(x, real(x))
-                if k + 1 in (20, 40, 100):
+                if k + 1 in (*READ_OFF, 100):
                     row[f"today {k + 1}"] = true(optimizer.recommend().x)
             write(args, key, row)
     table(args, ("object",))

@@ -1,5 +1,6 @@
 """One part of the fuzz run, in a process of its own."""
 
+import logging
 import random
 import resource
 import sys
@@ -16,6 +17,7 @@ MEMORY = 6 << 30  #: bytes of address space
 def run(part: str, seed: int, seconds: float, folder: Path) -> None:
     """Try for so many seconds, and write what was found."""
     warnings.simplefilter("ignore")
+    logging.disable()
     findings, draw, end = Findings(folder / "under way"), random.Random(f"{part} {seed}"), time.monotonic() + seconds
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     if part == "calls":

@@ -77,6 +77,11 @@ def test_no_runs_problems_or_methods_are_refused(cheap):
         cheap.tasks(runs=0)
 
 
+def test_a_label_that_a_list_of_labels_would_cut_is_refused(cheap):
+    with pytest.raises(InputError, match="label 'hill, steep' in plan 'cheap' has a comma"):
+        replace(cheap, problems={"hill, steep": cheap.problems["hill"]})
+
+
 @pytest.mark.parametrize("text", ["0/2", "3/2", "2", "a/b", "1/0", "1/2/3"])
 def test_bad_shares_are_refused(text):
     with pytest.raises(InputError, match="shard"):

@@ -249,6 +249,24 @@ def test_the_bumped_bowl_in_polar_coordinates():
     assert problem.function(np.array([0.3, 0.4, 0.5])) == pytest.approx(-bowl(0.5) * 2.25)
 
 
+def test_the_worst_within_a_distance_of_the_polynomial():
+    """StableOpt's problem, of which brute force on the whole disc finds -4.28 at (-.181, .292)."""
+    problem = robust_problem("stableopt-polynomial")
+    radii, turns = np.meshgrid(np.linspace(0.0, 0.5, 11), np.linspace(0.0, 2.0 * np.pi, 361))
+    disc = np.column_stack([(radii * np.cos(turns)).ravel(), (radii * np.sin(turns)).ravel()])
+
+    def asked(x):
+        return min(problem.function(x + disc))
+
+    assert problem.optimum.x == pytest.approx([-0.181, 0.292], abs=5e-4)
+    assert problem.value(problem.optimum.x)[0] == pytest.approx(problem.optimum.value, abs=1e-5)
+    assert asked(problem.optimum.x) == pytest.approx(-4.28, abs=0.01)
+    around = [(-0.1, 0.3), (-0.25, 0.3), (-0.18, 0.2), (-0.18, 0.4), (0.4, 0.6), (2.5, 4.0)]
+    for place in around:
+        assert problem.value(np.array(place))[0] == pytest.approx(asked(np.array(place)), abs=0.05 * abs(asked(place)))
+        assert problem.value(np.array(place))[0] < problem.optimum.value
+
+
 def test_ten_times_the_function_of_assael():
     problem, base = robust_problem("airbo-rkhs"), named_function("rkhs")
     places = np.linspace(0.1, 0.9, 7)[:, None]

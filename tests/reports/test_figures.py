@@ -56,6 +56,7 @@ def test_marks_of_few_trials_are_found_too(rkhs_report):
     few = replace(rkhs_report, X=rkhs_report.X[:2], y=rkhs_report.y[:2], **traces)
     drawing = figures.svg_text(figures.trace(few), "trace")
     assert figures.inline_svg(drawing, "trace", "", {"trials-told": ["first", "second"]}).count("<title>") == 2
+    assert "<title>" not in figures.inline_svg(drawing, "trace", "", {"trials-told": []}), "a stray mark has no trial"
 
 
 def test_the_histogram_counts_every_query(gm_report):

@@ -7,6 +7,7 @@ import time
 import optuna
 import pytest
 
+import surehold as sh
 from surehold.errors import InputError
 from surehold.studies.dashboard_note import read_note, write_note
 from surehold.studies.robot import RobotStudy
@@ -74,6 +75,18 @@ def test_journals_that_are_none_are_left_alone(text, tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         RobotStudy.create("mug", SETTINGS, str(path))
     assert path.read_text() == text
+
+
+@pytest.mark.parametrize("number", ["1e999", '"two"', "null", "[]"])
+def test_a_journal_with_a_strange_number_in_a_sound_line(number, tmp_path):
+    path = tmp_path / "journal.log"
+    robot = RobotStudy.create("mug", StudySettings(SearchSpace(sh.Box({"n": (2, 5, "int")})), None, {}, {}), str(path))
+    robot.tell(robot.ask().id, 0.5)
+    text = path.read_text().replace(r"\"low\": 2", rf"\"low\": {number}".replace('"two"', r"\"two\""))
+    assert text != path.read_text()
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"cannot be read: .*damaged"):
+        RobotStudy.open("mug", str(path))
 
 
 def test_databases_that_are_none_or_of_a_newer_version(tmp_path):

@@ -118,6 +118,11 @@ class Plan:
     def __post_init__(self) -> None:
         if not self.problems or not self.methods:
             raise InputError(f"plan '{self.name}' has no {'methods' if self.problems else 'problems'}; name one.")
+        for label in (*self.problems, *self.methods):
+            if "," in label:
+                raise InputError(
+                    f"label '{label}' in plan '{self.name}' has a comma, which separates labels; leave it out."
+                )
         _whole(f"runs of plan '{self.name}'", self.runs, _MOST_RUNS)
         for label, on in self.problems.items():
             where = f"of problem '{label}' in plan '{self.name}'"

@@ -215,7 +215,7 @@ class _Run:
         last = Candidate("the grasp, on the true shape", self.answer.x, -1.0, scene=drawn(self.real, grasp))
         note = f"{grasp.status}, quality {grasp.quality:.3f} with {len(grasp.contacts)} contacts."
         goal = "to find a safe grasp" if self.goal == "grasp" else "to know the shape"
-        text = f"Touched {goal}. Left what is believed, right the true shape. {LEGEND} The dots are contacts."
+        text = f"Touched {goal}. Left what is believed, right the true shape: {LEGEND} The dots are contacts."
         views = [*self.views, last]
         page = render_scenes(f"Exploring the {self.body.name}", text, views, [*self.notes, note], _COLUMNS, self.rows)
         write_file(folder / "explore.html", page)

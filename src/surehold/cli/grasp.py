@@ -55,10 +55,10 @@ class Outcomes:
         return self._kept[key]
 
     def __call__(self, x: Any) -> float:
-        """Return the quality at x (d,), its mean over the shapes where it is not known; or whether it is held."""
+        """Return the quality at x (d,), its mean over the shapes with --plan shapes; or whether it is held."""
         if self.checker is not None:
             return float(self.checker.held([self.grasp(x)])[0])
-        return self.problem(x) if self.problem.object.draws else self.grasp(x).quality
+        return self.problem(x) if self.problem.averaged else self.grasp(x).quality
 
 
 def simulator_preset(preset: str) -> str:
@@ -220,15 +220,15 @@ def drawn(problem: Any, outcome: Any) -> Any:
     """Return the scene of a grasp; an object of unknown shape is colored by how uncertain its surface is."""
     from surehold.grasping.pictures.scene import grasp_scene
     from surehold.reports.gather import drawn_scene
-    from surehold.reports.uncertain_shape import shape_meshes
+    from surehold.reports.uncertain_shape import LEGEND, shape_meshes
 
     scene = drawn_scene(grasp_scene(problem.simulator, outcome))
     body = problem.object
     if not body.draws:
         return scene
     away = np.stack([draw.distances.distance(body.vertices) for draw in body.draws])
-    meshes = shape_meshes(body.vertices, body.faces, np.sqrt(np.mean(away**2, axis=0)))
-    return replace(scene, meshes=(*meshes, *scene.meshes[1:]))
+    meshes = shape_meshes(body.vertices, body.faces, np.sqrt(np.mean(away**2, axis=0)), see_through=True)
+    return replace(scene, meshes=(*meshes, *scene.meshes[1:]), legend=LEGEND)
 
 
 def posture_text(s1: float | tuple[float, ...]) -> str:

@@ -4,6 +4,7 @@
     airbo-     Cao et al. 2023, AIRBO: the same
     mvar-      Daulton et al. 2022, robust multi-objective optimization: its first objective alone, value at risk
     qing-      Qing et al. 2022, mean-variance optimization by Fourier features: mean - beta variance
+    stableopt- Bogunovic et al. 2018, StableOpt: the worst outcome within a distance
     rahbo-     Makarova et al. 2021, RAHBO: exact inputs, mean - beta variance of the observations
 
 Input noise carries inputs outside the box; the functions go on there, but for the polynomial of Bertsimas et al. 2010,
@@ -111,6 +112,13 @@ def _nes_polynomial() -> RobustProblem:
     return RobustProblem(function, InputNoise({"x1": 0.6, "x2": 0.6}), initial=5, trials=55)
 
 
+def _stableopt_polynomial() -> RobustProblem:
+    box = Box({"x1": (-0.95, 3.2), "x2": (-0.45, 4.4)})
+    turns = np.linspace(0.0, 2.0 * np.pi, 31, endpoint=False)  # of a disc the worst lies on the rim but for valleys
+    errors = 0.5 * np.vstack([np.column_stack([np.cos(turns), np.sin(turns)]), np.zeros(2)])
+    return RobustProblem(Formula("stableopt-polynomial", box, polynomial), InputNoise.samples(errors), risk="worst")
+
+
 def _airbo_rkhs() -> RobustProblem:
     base = RKHS()
     function = GaussianBumps(
@@ -154,6 +162,7 @@ _MAKERS: Final[dict[str, Callable[[], RobustProblem]]] = {
     "nes-gmm": lambda: RobustProblem(_mixture("nes-gmm"), InputNoise.unit(0.1), initial=5, trials=55),
     "nes-polynomial": _nes_polynomial,
     "nes-hartmann-3": lambda: RobustProblem(hartmann_3(), InputNoise.unit(0.1), initial=10, trials=110),
+    "stableopt-polynomial": _stableopt_polynomial,
     "airbo-rkhs": _airbo_rkhs,
     "airbo-custom-k": lambda: RobustProblem(
         Formula("airbo-custom-k", _LINE, custom_k), InputNoise.unit(0.01), initial=10, trials=110
@@ -193,6 +202,7 @@ _OPTIMA: Final[dict[str, tuple[list[float], float]]] = {
     "nes-gmm": ([0.2003, 0.2002], 0.400115),
     "nes-polynomial": ([0.2688, 0.6745], -7.34310),
     "nes-hartmann-3": ([0.11729, 0.56941, 0.83030], 2.971075),
+    "stableopt-polynomial": ([-0.180758, 0.292012], -4.261117),
     "airbo-rkhs": ([0.077565], 49.38220),
     "airbo-custom-k": ([0.35011], 7.876019),
     "airbo-bumped-bowl": ([0.0, 0.0, 0.0], -37.854),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.samples import Samples
 from surehold.problems.problem import Optimum
 from surehold.problems.synthetic import GaussianBumps
 
@@ -52,6 +53,10 @@ class RobustProblem(NamedTuple):
             For a risk that has no closed form or quadrature here.
         """
         points = np.atleast_2d(x)
+        if self.risk == "worst" and self.noise is not None and isinstance(self.noise.kind, Samples):
+            errors = self.noise.kind.errors
+            values = self.function((points[:, None] + errors).reshape(-1, points.shape[1]))
+            return values.reshape(len(points), len(errors)).min(axis=1)
         if self.noise is None:
             mean, std = self.function(points), self.observed_std(points)
         else:
@@ -63,7 +68,9 @@ class RobustProblem(NamedTuple):
             return mean - self.beta * (std if self.risk == "mean-std" else np.square(std))
         if self.risk == "var" and self.noise is not None:
             return np.array([_quantile(self.function, point, self.noise, self.alpha) for point in points])
-        raise InputError(f"risk '{self.risk}' has no value here; give mean, mean-std, mean-variance or var.")
+        raise InputError(
+            f"risk '{self.risk}' has no value here; give mean, mean-std, mean-variance, var, or worst of samples."
+        )
 
     def observed_std(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the standard deviation of the observation noise (n,) at x (n, d)."""

@@ -106,6 +106,7 @@ def scene_context(
         "scene_first": opening,
         "scene_moves": any(_moves(c.scene) for c in shown if c.scene is not None),
         "scene_has_contacts": any(c.scene is not None and c.scene.contacts is not None for c in shown),
+        "scene_legend": next((c.scene.legend for c in shown if c.scene is not None and c.scene.legend), ""),
         "scene_has_neighbors": any(c.scene is not None and c.scene.neighbors is not None for c in shown),
         "scene_has_box": any(c.scene is not None and c.scene.box is not None for c in shown),
         "three": Markup("" if scene is None else _vendored("three.bundle.min.js")),

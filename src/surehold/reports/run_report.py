@@ -100,6 +100,7 @@ class Scene:
     box: ObjectBox | None = None
     neighbors: Neighbors | None = None
     view: tuple[float, float, float] = (0.5, -0.8, 1.0)  #: direction from the object to the eye
+    legend: str = ""  #: what the colors of its meshes mean, where they mean something
 
 
 @dataclass(frozen=True)

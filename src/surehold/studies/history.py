@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from optuna.trial import FrozenTrial, TrialState
 
+from surehold.errors import InputError
 from surehold.optimization.success import MOST_EXECUTIONS
 from surehold.studies.search_space import SearchSpace
 
@@ -61,42 +62,62 @@ def history_of(
 
     `outputs` are the names of further outputs.
     """
-    told: list[Mapping[str, Any]] = []
-    reached: list[Mapping[str, Any]] = []
-    pending: list[Mapping[str, Any]] = []
-    values: list[float] = []
-    numbers: list[int] = []
-    measured: list[list[float]] = []
-    executions: list[int] = []
     ordered = sorted(trials, key=lambda trial: trial.number)
-    retried = {k for trial in ordered for k in trial.system_attrs.get("retry_history", ())}
-    for trial in ordered:
-        if trial.number == number or trial.number in retried:
-            continue
-        parameters = parameters_of(trial)
-        if not space.contains(parameters):
-            continue
-        if not trial.state.is_finished():
-            pending.append(parameters)
-            continue
-        value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
-        told.append(parameters)
-        actual = parameters | trial.user_attrs.get(REACHED, {})
-        reached.append(actual if space.encodes(actual) else parameters)
-        values.append(value if np.isfinite(value) else np.nan)
-        numbers.append(trial.number)
-        attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
-        of = trial.user_attrs.get(EXECUTIONS, 1)
-        executions.append(of if type(of) is int and 0 < of <= MOST_EXECUTIONS and np.isfinite(value) else 1)
-        measured.append([_finite(attributes.get(name)) for name in outputs])
+    told: list[_Told] = []
+    pending: list[Mapping[str, Any]] = []
+    trial = None
+    try:
+        retried = set[int]()
+        for trial in ordered:
+            retried.update(trial.system_attrs.get("retry_history", ()))
+        for trial in ordered:
+            if trial.number == number or trial.number in retried:
+                continue
+            parameters = parameters_of(trial)
+            if not space.contains(parameters):
+                continue
+            if trial.state.is_finished():
+                told.append(_told(trial, parameters, space, outputs))
+            else:
+                pending.append(parameters)
+    except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+        which = "a trial" if trial is None else f"trial {trial.number}"
+        raise InputError(f"{which} of the study is damaged ({error}); restore a copy of the storage.") from error
     return History(
-        space.encode_all(told),
-        np.array(values, dtype=np.float64),
-        space.encode_all(reached, anywhere=True),
+        space.encode_all([row.parameters for row in told]),
+        np.array([row.value for row in told], dtype=np.float64),
+        space.encode_all([row.reached for row in told], anywhere=True),
         space.encode_all(pending),
-        np.array(numbers, dtype=np.intp),
-        np.array(measured, dtype=np.float64).reshape(len(numbers), len(outputs)),
-        np.array(executions, dtype=np.intp),
+        np.array([row.number for row in told], dtype=np.intp),
+        np.array([row.measured for row in told], dtype=np.float64).reshape(len(told), len(outputs)),
+        np.array([row.executions for row in told], dtype=np.intp),
+    )
+
+
+class _Told(NamedTuple):
+    """A trial that was told or failed."""
+
+    number: int
+    parameters: Mapping[str, Any]
+    reached: Mapping[str, Any]
+    value: float
+    measured: list[float]
+    executions: int
+
+
+def _told(trial: FrozenTrial, parameters: Mapping[str, Any], space: SearchSpace, outputs: Sequence[str]) -> _Told:
+    value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
+    value = value if np.isfinite(value) else np.nan
+    actual = {**parameters, **trial.user_attrs.get(REACHED, {})}
+    attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
+    of = trial.user_attrs.get(EXECUTIONS, 1)
+    return _Told(
+        trial.number,
+        parameters,
+        actual if space.encodes(actual) else parameters,
+        value,
+        [_finite(attributes.get(name)) for name in outputs],
+        of if type(of) is int and 0 < of <= MOST_EXECUTIONS and np.isfinite(value) else 1,
     )
 
 

@@ -258,7 +258,7 @@ def _journal(path: Path, create: bool) -> Storage:
         backend = JournalStorage(_Journal(path))
     except OSError as error:
         raise InputError(f"storage {str(path)!r} cannot be used: {error.strerror or error}.") from None
-    except (ValueError, KeyError, AssertionError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, OverflowError, KeyError, AssertionError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"storage {str(path)!r} cannot be read: no journal, damaged, or of a newer version of Optuna ({error})."
         ) from None

@@ -112,7 +112,7 @@ class TouchedShape:
         history = history_of(trials, space)
         known = np.isfinite(history.y)
         lowest = float(history.y[known].min()) if known.any() else 0.0
-        run = Exploration(self.problem, self._belief, self._noise, self._goal, seed=self._seed, scaled=True)
+        run = Exploration(self.problem, self._belief, self._noise, self._goal, seed=self._seed)
         finished = sorted((t for t in trials if t.state in (TrialState.COMPLETE, TrialState.FAIL)), key=_number)
         contacts = [contacts_told(t.user_attrs[CONTACTS]) for t in finished if CONTACTS in t.user_attrs]
         run.restore(history.reached, np.where(known, history.y, min(lowest, 0.0)), contacts)

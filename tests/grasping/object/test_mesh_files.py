@@ -147,6 +147,14 @@ def test_coordinates_that_are_not_finite(tmp_path, value):
     refused(tmp_path / "bad.stl", "not finite")
 
 
+def test_a_size_beyond_measure_is_said_in_few_digits(tmp_path):
+    far = "v 0 0 0\nv 1e300 0 0\nv 0 1e300 0\nv 0 0 1e300\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    (tmp_path / "far.obj").write_text(far)
+    with pytest.raises(InputError, match=r"1e\+30") as caught:
+        load_mesh(tmp_path / "far.obj", unit="m")
+    assert len(str(caught.value)) < 300
+
+
 def test_damaged_files(tmp_path):
     whole = stored(tmp_path, box()).read_bytes()
     glb = box()

@@ -66,3 +66,19 @@ def test_mass_and_center_of_a_box(belief):
     assert 0.93 * volume < obj.mass / 1000.0 < volume
     assert np.abs(obj.center_of_mass).max() < 1e-4
     assert obj.box_half_extents == pytest.approx(BOX.half, abs=2e-4)
+
+
+def test_no_draw_fills_what_is_free(belief):
+    place = np.array([[-0.045, 0.0, 0.0]])  # behind, where nothing was measured
+    within = np.linalg.norm(belief.grid.nodes - place, axis=1) < 0.012
+    surface = surface_of(BOX, belief.surface.observations, 0.02, 0.02)
+    wild = ShapeBelief(surface, belief.grid)
+    mean, *draws = wild.values(6, np.random.default_rng(0)).reshape(7, -1)
+    assert np.sum(np.array(draws)[:, within] < 0.0) > 0
+    free = wild.with_surface(surface, np.append(place, [[0.012]], axis=1))
+    same, *lifted = free.values(6, np.random.default_rng(0)).reshape(7, -1)
+    assert np.all(np.array(lifted)[:, within] >= 0.0)
+    assert np.array_equal(mean, same)
+    floor = 0.012 - np.linalg.norm(belief.grid.nodes - place, axis=1)
+    changed = np.array(lifted) != np.array(draws)
+    assert np.array(lifted)[changed] == pytest.approx(np.broadcast_to(floor, changed.shape)[changed], abs=1e-12)

@@ -1,3 +1,5 @@
+from base64 import b64decode
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,29 @@ def test_the_same_points_from_all_formats(tmp_path):
             assert cloud.camera == pytest.approx([0.0, 0.0, 0.5]), name
 
 
+# Compressed by liblzf: 40 points, x = 0.05 ((7 i) % 11) / 10 - 0.02, y = 0.03, z = 0.002 i, the x of all points first.
+LZF = (
+    "DgrXo7yPwnU8Cteju4/C9SAHACNAAwO8zczMIAcBozsgGwC8IAcBPAAgACAH4GgrQJPgkwMhFgsAbxIDO28Sgzumm8QgBwADITcJIzymm0Q8QmBlPCAX"
+    "Azy8dJMgEwSjPFg5tCAXBMQ89P3UIBsA5WDXIC8MPZZDCz28dBM946UbPSA7DD0xCCw9WDk0PX9qPD0gRww9zcxMPfT9VD0bL109IFMEPWiRbT0hlwQ9"
+    "tvN9PSBfAz0CK4cgQwSLPSlcjyBHBJM9UI2XIEsFmz13vp89"
+)
+
+
+def test_a_compressed_pcd_holds_field_after_field(tmp_path):
+    head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 40\nHEIGHT 1\nPOINTS 40\n"
+    packed = b64decode(LZF)
+    sizes = np.array([len(packed), 480], dtype="<u4").tobytes()
+    (tmp_path / "a.pcd").write_bytes(head.encode() + b"DATA binary_compressed\n" + sizes + packed)
+    i = np.arange(40)
+    expected = np.column_stack([0.05 * ((7 * i) % 11) / 10.0 - 0.02, np.full(40, 0.03), 0.002 * i])
+    assert read_cloud(tmp_path / "a.pcd").points == pytest.approx(expected, abs=1e-6)
+    flat = packed[:1] + b"\xff" + packed[1:]  # a byte too many
+    more = np.array([len(flat), 480], dtype="<u4").tobytes()
+    (tmp_path / "c.pcd").write_bytes(head.encode() + b"DATA binary_compressed\n" + more + flat)
+    with pytest.raises(InputError, match="damaged"):
+        read_cloud(tmp_path / "c.pcd")
+
+
 def test_normals_of_a_ply(tmp_path):
     names = ("x", "y", "z", "nx", "ny", "nz")
     head = "ply\nformat ascii 1.0\nelement vertex 7\n" + "".join(f"property float {n}\n" for n in names)
@@ -55,7 +80,9 @@ def test_normals_of_a_ply(tmp_path):
         ("a.npz", b"PK", "cannot be read as NPZ"),
         ("a.pcd", b"VERSION 0.7\n", "no DATA line"),
         ("a.pcd", pcd(b"", 7, "binary"), "ends before its 7 points"),
-        ("a.pcd", pcd(b"", 7, "binary_compressed"), "pcl_convert_pcd_ascii_binary"),
+        ("a.pcd", pcd(b"", 7, "binary_compressed"), "ends before its 7 points"),
+        ("a.pcd", pcd(bytes([9, 0, 0, 0, 140, 0, 0, 0]) + b"\x00" + bytes(8), 7, "binary_compressed"), "damaged"),
+        ("a.pcd", pcd(b"", 7, "binary_zip"), "its data are binary_zip"),
         ("a.pcd", pcd(b"", 0, "binary"), "holds no points"),
     ],
 )

@@ -65,6 +65,21 @@ def test_only_the_largest_part_stays():
     assert np.all(np.linalg.norm(places - a, axis=1) < 0.02)
 
 
+def test_a_smaller_part_stays_where_it_was_measured():
+    a, b = np.array([-0.02, 0, 0]), np.array([0.03, 0, 0])
+
+    def two(x):
+        return np.minimum(np.linalg.norm(x - a, axis=1) - 0.02, np.linalg.norm(x - b, axis=1) - 0.01)
+
+    values = values_of(two)
+    directions = np.random.default_rng(0).standard_normal((40, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    seen = GRID.nearest(np.vstack([np.repeat(a + 0.02 * directions, 5, axis=0), b + 0.01 * directions]))
+    assert np.array_equal(one_piece(values, seen), values)
+    assert np.sum(one_piece(values, seen[:200]) < 0.0) < np.sum(values < 0.0)
+    assert GRID.nodes.reshape(*GRID.shape, 3)[tuple(GRID.nearest(b[None])[0])] == pytest.approx(b, abs=0.001)
+
+
 def test_nothing_inside_is_an_error():
     with pytest.raises(SureholdError, match="encloses nothing"):
         one_piece(np.ones((3, 3, 3)))

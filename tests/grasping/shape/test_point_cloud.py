@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
+from surehold.grasping.object.distance_field import distance_field_of
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.shape.point_cloud import cleaned
 from surehold.grasping.shape.views import camera_towards, half_view, surface_points
@@ -82,6 +83,34 @@ def test_what_no_shape_can_be_learnt_from_is_said_in_one_line(mug, change, said)
     with pytest.raises(InputError, match=said) as error:
         cleaned(change(mug))
     assert "\n" not in str(error.value)
+
+
+def fingers(n, rng):
+    """Two fingers on both sides of the view, 3 to 10 cm before the camera."""
+    view = -CAMERA / np.linalg.norm(CAMERA)
+    side = np.cross(view, [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side)
+    turn, along = rng.uniform(0.0, 2.0 * np.pi, n), rng.uniform(0.03, 0.10, n)
+    round_ = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(side, view)
+    return CAMERA + along[:, None] * view + 0.008 * round_ + np.where(np.arange(n) % 2, 0.012, -0.012)[:, None] * side
+
+
+@pytest.mark.parametrize("n", [60, 1000])
+def test_the_fingers_before_a_camera_on_the_hand_are_left_out(mug, n):
+    own = fingers(n, np.random.default_rng(5))
+    cloud = cleaned(np.vstack([mug, own]), camera=CAMERA)
+    assert (
+        any("of the camera, as of a hand, were left out" in note for note in cloud.notes) or n == 60
+    )  # or as outliers
+    assert np.abs(distance_field_of(shipped_object("mug")).distance(cloud.points)).max() < 0.006
+
+
+def test_a_hand_that_is_most_of_the_cloud_is_refused(mug):
+    with pytest.raises(InputError, match="take out those of the hand that carries the camera") as error:
+        cleaned(np.vstack([mug[::4], fingers(2000, np.random.default_rng(5))]), camera=CAMERA)
+    assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="without the hand's own points"):
+        cleaned(np.vstack([mug, fingers(2000, np.random.default_rng(5))]))
 
 
 def test_a_camera_among_the_points_is_refused(mug):

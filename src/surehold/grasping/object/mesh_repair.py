@@ -53,7 +53,7 @@ def repaired(name: str, vertices: Array, faces: Faces, unit: str) -> tuple[Array
     if not np.all(np.isfinite(vertices)):
         raise InputError(f"{name!r} has coordinates that are not finite; repair the mesh.")
     size = np.ptp(vertices, axis=0)
-    numbers = (f"{1e3 * s:.4g}" if s < 10.0 else f"{1e3 * s:,.0f}" for s in size)
+    numbers = (f"{1e3 * s:,.0f}" if 10.0 <= s < 1e6 else f"{1e3 * s:.4g}" for s in size)
     shown = f"{' x '.join(numbers)} mm in unit {unit}"
     if size.max() < _SMALLEST or size.max() > _LARGEST:
         fitting = [u for u, meters in UNITS.items() if 0.02 <= size.max() / UNITS[unit] * meters <= 0.5]

@@ -7,10 +7,13 @@
 
 (Rahimi and Recht 2008; Wilson and others 2020.) The values of all of them on the grid are weighted sums of the same
 kernel values, computed at once. Far from the surface they are computed on every second node and interpolated.
+
+A draw knows no bounds. Where the object is known to be r or farther from a point p, a draw is lifted to what that says
+of every place x, since distances change by no more than the way between: f_b(x) >= r - |x - p|.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -28,6 +31,7 @@ Array = NDArray[np.float64]
 
 DENSITY: Final = 1000.0  #: of an object whose mass is not given [kg/m^3]
 _FEATURES: Final = 400  #: F
+_NEAREST: Final = 4  # free points that are looked at from a node
 _BAND: Final = 2.0  # cells on each side of the surface in which every node is computed
 REACH: Final = 0.016  #: of the grid beyond the object: a finger's radius and the soft touch [m]
 
@@ -41,6 +45,7 @@ class ShapeBelief:
     name: str = "unknown"
     mass: float | None = None  #: kg; that of `DENSITY` if not known
     friction: float = 0.5
+    free: Array = field(default_factory=lambda: np.empty((0, 4)), repr=False)  #: (b, 4) as of `Observations`
 
     def values(self, draws: int = 0, rng: np.random.Generator | None = None) -> Array:
         """Return f (1 + draws, nx, ny, nz) at the nodes: of the posterior mean first, then of the draws."""
@@ -67,7 +72,10 @@ class ShapeBelief:
                 total[:, 1:] += waves.value(points)
             return total
 
-        return _on_grid(self.grid, at, 1 + draws)
+        values = _on_grid(self.grid, at, 1 + draws)
+        if draws:
+            _lift(values[1:], self.grid, self.free)
+        return values
 
     def objects(self, draws: int = 0, rng: np.random.Generator | None = None) -> list[GraspObject]:
         """Return the mean shape and draws of it as objects with their distances, all in the same frame and box axes.
@@ -77,7 +85,9 @@ class ShapeBelief:
         SureholdError
             If a shape has no inside.
         """
-        return [self._object(one_piece(values)) for values in self.values(draws, rng)]
+        known = self.surface.observations
+        measured = self.grid.nearest(known.points[known.values == 0.0])
+        return [self._object(one_piece(values, measured)) for values in self.values(draws, rng)]
 
     def mean_object(self) -> GraspObject:
         """Return the mean shape as an object."""
@@ -94,9 +104,9 @@ class ShapeBelief:
         field = distances_of(values, self.grid)
         return GraspObject(self.name, vertices, faces, mass, center, self.friction, axes=axes, distances=field)
 
-    def with_surface(self, surface: ImplicitSurface) -> "ShapeBelief":
-        """Return the belief after other observations, on the same grid."""
-        return replace(self, surface=surface)
+    def with_surface(self, surface: ImplicitSurface, free: Array | None = None) -> "ShapeBelief":
+        """Return the belief after other observations, on the same grid; `free` (b, 4) is added to what is free."""
+        return replace(self, surface=surface, free=self.free if free is None else np.vstack([self.free, free]))
 
 
 def grid_of(surface: ImplicitSurface, cell: float, reach: float = REACH, growth: float = 2.0) -> Grid:
@@ -112,6 +122,20 @@ def grid_of(surface: ImplicitSurface, cell: float, reach: float = REACH, growth:
     else:
         lower, upper = lower - spread, upper + spread
     return grid_around(lower, upper, cell, reach + 2.0 * cell)
+
+
+def _lift(values: Array, grid: Grid, free: Array) -> None:
+    """Raise values (b, nx, ny, nz) to what free points (f, 4) say of them, in place."""
+    from scipy.spatial import KDTree
+
+    if not len(free):
+        return
+    reach = float(free[:, 3].max())
+    low = np.any(values < reach, axis=0)
+    near = KDTree(free[:, :3])
+    gaps, which = near.query(grid.nodes[low.ravel()], k=min(_NEAREST, len(free)), distance_upper_bound=reach + 1e-12)
+    floor = np.append(free[:, 3], 0.0)[which] - gaps  # of what is farther: -inf
+    values[:, low] = np.maximum(values[:, low], floor if floor.ndim == 1 else floor.max(axis=1))
 
 
 class _Waves:

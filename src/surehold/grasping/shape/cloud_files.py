@@ -1,8 +1,8 @@
 """Point clouds from files: PLY, PCD, XYZ and NPZ, as they are, in the file's unit.
 
 PLY   vertices x y z and, where they are there, nx ny nz (read by trimesh); faces are not looked at
-PCD   ascii or binary, fields x y z and normal_x normal_y normal_z; the header's VIEWPOINT is the camera, unless it
-      is the origin, which most writers leave there. Compressed ones are refused with what unpacks them
+PCD   ascii, binary or compressed, fields x y z and normal_x normal_y normal_z; the header's VIEWPOINT is the camera,
+      unless it is the origin, which most writers leave there
 XYZ   text, three or six columns: x y z and nx ny nz; # starts a comment
 NPZ   arrays "points" (n, 3), and optionally "normals" (n, 3) and "camera" (3,)
 """
@@ -10,12 +10,13 @@ NPZ   arrays "points" (n, 3), and optionally "normals" (n, 3) and "camera" (3,)
 import io
 import stat
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.grasping.shape.lzf import unpacked
 
 __all__ = ["CLOUD_FORMATS", "RawCloud", "read_cloud"]
 
@@ -107,6 +108,25 @@ def _npz(content: bytes) -> RawCloud:
     return RawCloud(found["points"], found.get("normals"), camera)
 
 
+def _by_point(packed: bytes, record: np.dtype[Any], length: int) -> bytes:
+    """Return compressed data, which hold field after field, point after point."""
+    if len(packed) < 8:
+        raise InputError(f"it ends before its {length} points; copy it again.")
+    inside, size = (int(number) for number in np.frombuffer(packed, dtype="<u4", count=2))
+    if len(packed) - 8 < inside or size != length * record.itemsize:
+        raise InputError(f"it ends before its {length} points; copy it again.")
+    data = unpacked(packed[8 : 8 + inside], size)
+    table = np.empty(length, dtype=record)
+    start = 0
+    for name in record.names or ():
+        kind = record[name]
+        table[name] = np.frombuffer(data, dtype=kind.base, count=length * kind.shape[0], offset=start).reshape(
+            length, -1
+        )
+        start += length * kind.itemsize
+    return table.tobytes()
+
+
 def _pcd(content: bytes) -> RawCloud:
     header: dict[str, list[str]] = {}
     start = 0
@@ -122,8 +142,8 @@ def _pcd(content: bytes) -> RawCloud:
     sizes = [int(word) for word in header["SIZE"]]
     counts = [int(word) for word in header.get("COUNT", ["1"] * len(names))]
     length = int(header["POINTS"][0])
-    if form not in ("ascii", "binary"):
-        raise InputError(f"its data are {form}; unpack them with: pcl_convert_pcd_ascii_binary in.pcd out.pcd 1.")
+    if form not in ("ascii", "binary", "binary_compressed"):
+        raise InputError(f"its data are {form}; give ascii, binary or binary_compressed.")
     if not {"x", "y", "z"} <= set(names):
         raise InputError(f"its fields are {' '.join(names)}; x, y and z are needed.")
     if form == "ascii":
@@ -139,6 +159,8 @@ def _pcd(content: bytes) -> RawCloud:
             for i, (name, k, size, count) in enumerate(zip(names, kinds, sizes, counts, strict=True))
         ]
         record = np.dtype(fields)
+        if form == "binary_compressed":
+            content, start = _by_point(content[start:], record, length), 0
         if len(content) - start < length * record.itemsize:
             raise InputError(f"it ends before its {length} points; copy it again.")
         table = np.frombuffer(content, dtype=record, count=length, offset=start)

@@ -110,7 +110,18 @@ def belief_of_cloud(
     else:
         surface = surface_of(box, told, scales.std, scales.length)
     fitting = min(max(CELL[0] * 2.0 * float(half.max()), CELL[1]), CELL[2])
-    return ShapeBelief(surface, grid_of(surface, cell or fitting), name, mass, friction)
+    grid = grid_of(surface, cell or fitting)
+    return ShapeBelief(surface, grid, name, mass, friction, seen_free(cloud, grid.nodes))
+
+
+def seen_free(cloud: PointCloud, places: Array) -> Array:
+    """Return those of places (p, 3) that the camera saw free, with the object's least distance there (b, 4) [m]."""
+    from scipy.spatial import KDTree
+
+    if cloud.camera is None:
+        return np.empty((0, 4))
+    free = places[_Image(cloud).contradicted(places)]
+    return np.column_stack([free, np.minimum(0.5 * KDTree(cloud.points).query(free)[0], _FREE_REACH)])
 
 
 def free_points(cloud: PointCloud, shape: PriorShape) -> Array:

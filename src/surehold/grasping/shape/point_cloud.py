@@ -197,13 +197,14 @@ def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Ar
     """Return the points without outliers and small groups.
 
     A part that hides another tears a cloud apart, but not the camera's image of it: groups are of one object if they
-    lie beside each other as the camera sees them.
+    lie beside each other as the camera sees them, and not farther apart than the larger is long: the hand that carries
+    the camera is. What is less than half as far from the camera as the object is left out.
 
     Raises
     ------
     InputError
-        If a second group is a fifth as large as the first, or larger, and lies apart; or if what is left is too large
-        to be grasped.
+        If a second group is a fifth as large as the first, or larger, and lies apart; if the first is less than half as
+        far from the camera as a second, as the hand that carries it is; or if what is left is too large to be grasped.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -225,26 +226,37 @@ def _largest_object(points: Array, camera: Array | None, notes: list[str]) -> Ar
     sizes = np.bincount(group)
     order = np.argsort(-sizes, kind="stable")
     largest = group == order[0]
-    seen = points[:, :3]
+    seen, far = points[:, :3], np.ones(len(points))
     if camera is not None:  # moved along their rays to one distance
         ray = seen - camera
         far = np.linalg.norm(ray, axis=1)
         seen = ray * (np.median(far) / far)[:, None]
-    first = KDTree(seen[largest])
-    kept = largest.copy()
+    first, place = KDTree(seen[largest]), KDTree(points[largest, :3])
+    extent = float(np.ptp(points[largest, :3], axis=0).max())
+    kept, carried = largest.copy(), np.zeros(len(points), dtype=bool)
     for number in order[1:]:
         mine = group == number
-        gap = float(first.query(seen[mine])[0].min())
-        if gap < _APART:
+        gap, way = (float(tree.query(rows[mine])[0].min()) for tree, rows in ((first, seen), (place, points[:, :3])))
+        if gap < _APART and way < extent:
             kept |= mine
+        elif far[mine].max() < 0.5 * far[largest].min():
+            carried |= mine
+        elif far[largest].max() < 0.5 * far[mine].min() and sizes[number] >= 0.05 * sizes[order[0]]:
+            raise InputError(
+                f"{np.sum(largest):,} points within {1e3 * far[largest].max():.0f} mm of the camera stand before "
+                f"{sizes[number]:,} others; take out those of the hand that carries the camera, or give one object."
+            )
         elif sizes[number] >= 0.2 * sizes[order[0]]:
             raise InputError(
-                f"the cloud holds two objects of {sizes[order[0]]:,} and {sizes[number]:,} points, "
-                f"{1e3 * gap:.0f} mm apart; give one of them."
+                f"the cloud holds two objects of {sizes[order[0]]:,} and {sizes[number]:,} points, {1e3 * way:.0f} mm "
+                "apart; give one of them, without the hand's own points."
             )
-    if not np.all(kept):
-        notes.append(f"{int(np.sum(~kept)):,} points apart from the object were left out")
-        points = points[kept]
+    if np.any(carried):
+        reach = 1e3 * far[carried].max()
+        notes.append(f"{np.sum(carried):,} points within {reach:.0f} mm of the camera, as of a hand, were left out")
+    if not np.all(kept | carried):
+        notes.append(f"{np.sum(~kept & ~carried):,} points apart from the object were left out")
+    points = points[kept]
     size = float(np.ptp(points[:, :3], axis=0).max())
     if size > _LARGEST:
         raise InputError(

@@ -94,8 +94,6 @@ class Exploration:
         Draws of the shape, B.
     seed
         Of all draws.
-    scaled
-        Whether what is told may be in another unit than the problem's quality; it is brought to it by least squares.
 
     Raises
     ------
@@ -111,12 +109,10 @@ class Exploration:
         goal: str = "grasp",
         shapes: int = 4,
         seed: int = 0,
-        scaled: bool = False,
     ):
         if goal not in GOALS:
             raise unknown_name("goal", goal, GOALS)
         self._problem, self._noise, self._goal, self._shapes, self._seed = problem, noise, goal, shapes, seed
-        self._scaled = scaled
         self.belief = belief
         self.X: Array = np.empty((0, problem.box.dimension))  #: trials told, in the units of the box
         self.y: Array = np.empty(0)  #: their qualities
@@ -152,28 +148,21 @@ class Exploration:
         if felt:
             surface = self.belief.surface
             told = replace(self._felt, free=self._free)
-            self.belief = self.belief.with_surface(surface_of(surface.prior, told, surface.std, surface.length))
+            learnt = surface_of(surface.prior, told, surface.std, surface.length)
+            self.belief = self.belief.with_surface(learnt, np.vstack([each.free for each in felt]))
 
     def recommend(self, tried: bool = False) -> ExploredGrasp:
         """Return the grasp that is expected to hold best under shape and hand noise; `tried`: of the trials told."""
         imagined = self._imagined()
         candidates = self.X if tried else np.vstack([self.X, self._candidates()])
         first = np.array([imagined.over_shapes(x).mean() for x in candidates])
-        # A trial was made on the true shape: its own value counts as much as all that is imagined.
-        off = np.zeros(len(candidates))
-        off[: len(self.X)] = 0.5 * (self._worth(first[: len(self.X)]) - first[: len(self.X)])
         answers = []
-        for k in np.argsort(-(first + off), kind="stable")[:_ANSWERS]:
+        for k in np.argsort(-first, kind="stable")[:_ANSWERS]:
             points = perturbed_points(candidates[k], self._problem.box, self._noise, _DISTURBED, self._seed)
-            values = np.array([imagined.over_shapes(point) for point in points]) + off[k]
+            values = np.array([imagined.over_shapes(point) for point in points])
             mean, std = float(values.mean()), float(values.std())
             answers.append(ExploredGrasp(candidates[k], mean, std, float(np.quantile(values, 0.05))))
         return max(answers, key=lambda answer: answer.mean)
-
-    def _worth(self, believed: Array) -> Array:
-        """Return what was told in the unit of the problem's quality; `believed` (n,) is that of the same trials."""
-        square = float(self.y @ self.y)
-        return self.y * (max(float(believed @ self.y), 0.0) / square if self._scaled and square > 0.0 else 1.0)
 
     def _imagined(self) -> GraspProblem:
         """Return the problem on the shapes that are possible now."""

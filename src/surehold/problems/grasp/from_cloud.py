@@ -85,7 +85,7 @@ def belief_of_file(words: Mapping[str, Any]) -> tuple[ShapeBelief, str]:
         checked_against(belief.surface, touched, f"{words['contacts']!r}")
         known = belief.surface
         learnt = surface_of(known.prior, known.observations + touched, known.std, known.length)
-        belief = belief.with_surface(learnt)
+        belief = belief.with_surface(learnt, touched.free)
         notes.append(f"{len(touched.points)} touches")
     return belief, "; ".join([f"{file.name}: {len(raw.points):,} points", *notes])
 

@@ -18,6 +18,7 @@ from surehold.grasping.hand.model import Hand
 __all__ = [
     "AMPLITUDES",
     "OPTIONS",
+    "PLANS",
     "THESIS_SIMULATOR",
     "VARIABLES",
     "DescribedGrasp",
@@ -39,6 +40,10 @@ VARIABLES: Final[Mapping[str, str]] = {
 
 #: Further amplitudes of a synergy that was learned with more than two components, and their units.
 AMPLITUDES: Final[Mapping[str, str]] = {"s2": "rad", "s3": "rad"}
+
+#: What a grasp of an object of unknown shape is worth: that on its mean shape, or the mean over draws of it. Planned on
+#: the draws, grasps of half views were worse on the true shape (benchmarks/unknown_shapes.py grasp).
+PLANS: Final = ("mean", "shapes")
 
 #: What the preset "thesis" sets: the simulator behind the thesis. `s1` then ranges within +-pi.
 THESIS_SIMULATOR: Final = {
@@ -93,6 +98,9 @@ class GraspOptions(TypedDict, total=False):
             CLOSING_MODES,
         ),
     ]
+    plan: Annotated[
+        str, GraspOption("mean", "Worth of a grasp of a cloud: on its mean shape, or the mean over its shapes.", PLANS)
+    ]
     preset: Annotated[str, GraspOption("", "thesis: the simulator of the thesis.", ("", "thesis"))]
     bounds: Annotated[
         Mapping[str, tuple[float, float]] | None, GraspOption(None, "Bounds of free variables.", text=None)
@@ -135,7 +143,7 @@ class DescribedGrasp(GraspOptions, total=False):
         str, GraspOption("mirror", "What a cloud does not show: mirror (of what it shows), box or ellipsoid.")
     ]
     shapes: Annotated[
-        int, GraspOption(8, "Equally likely shapes of a cloud that a grasp is to hold; 0: the mean alone.", text=int)
+        int, GraspOption(8, "Equally likely shapes of a cloud, which tell what its unknown side may cost.", text=int)
     ]
 
 

@@ -27,7 +27,7 @@ from surehold.grasping.poses import Pose, default_pose, facet_axes
 from surehold.grasping.simulator import Simulator
 from surehold.optimization.box import Box
 from surehold.problems.grasp.default_poses import GraspDefault, default_facet, grasp_default
-from surehold.problems.grasp.options import AMPLITUDES, OPTIONS, THESIS_SIMULATOR, VARIABLES, GraspOptions
+from surehold.problems.grasp.options import AMPLITUDES, OPTIONS, PLANS, THESIS_SIMULATOR, VARIABLES, GraspOptions
 from surehold.problems.problem import checked_points
 
 __all__ = ["GraspProblem"]
@@ -42,7 +42,7 @@ class GraspProblem:
     ----------
     obj
         Name of a shipped object ("mug", "bottle", "glass", "drill") or a `GraspObject`. Of one that has `draws`, the
-        value of a grasp is the mean quality over these shapes; poses are relative to the object itself.
+        poses are relative to the object itself.
     facet
         One of the 24 modes, "facet-thumb": the facet of the object's box that the palm faces, then the neighboring
         facet against which the thumb comes to press. By default "right-front", for the drill "bottom-front".
@@ -50,6 +50,9 @@ class GraspProblem:
         Names of the free variables, a subset of `VARIABLES`; their order is the order of the coordinates.
     contact, quality, closing, friction, torsion, cones, task, collision, hand, preshape
         As in `surehold.grasping.Simulator`; these and the following are described in options.py.
+    plan
+        What a grasp of an object that has `draws` is worth: "mean": that on the object itself, the mean shape;
+        "shapes": the mean over the draws.
     preset
         "thesis": single contacts, the quality "simox", closing "synergy", polyhedral cones, collisions worth 0, and s1
         within ±pi; "" for none.
@@ -66,6 +69,7 @@ class GraspProblem:
     name : such as "mug, right-front"
     box : Box of the free variables
     units : tuple of their units, "m" or "rad"
+    averaged : whether the value is the mean over the draws of an object of unknown shape
     default : standoff and s1 of the default pose and how they were found
 
     Raises
@@ -110,6 +114,8 @@ class GraspProblem:
         self._placed: GraspObject = body  # whose box the poses are relative to
         self.facet: Final[str] = facet
         self.name: Final[str] = f"{body.name}, {facet}"
+        if given["plan"] not in PLANS:
+            raise unknown_name("plan", given["plan"], PLANS)
         if preset not in OPTIONS["preset"].choices:
             raise unknown_name("preset", preset, ["thesis"])
         for name, value in THESIS_SIMULATOR.items() if preset else ():
@@ -117,6 +123,7 @@ class GraspProblem:
                 raise InputError(
                     f"preset '{preset}' sets {name} to {value!r}, but {given[name]!r} is given; leave one of them out."
                 )
+        self.averaged: Final[bool] = given.pop("plan") == "shapes"
         self._settings: dict[str, Any] = given | (THESIS_SIMULATOR if preset else {})
         self._settings["preshape"] = given["preshape"] or None
         self._simulator: Simulator | None = None
@@ -193,7 +200,7 @@ class GraspProblem:
         return other
 
     def _value(self, x: NDArray[np.float64]) -> float:
-        return float(self.over_shapes(x).mean()) if self.object.draws else self.grasp(x).quality
+        return float(self.over_shapes(x).mean()) if self.averaged else self.grasp(x).quality
 
     def _one(self, x: ArrayLike) -> NDArray[np.float64]:
         points, _ = checked_points(x, self.box)
