@@ -1,4 +1,4 @@
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))  # tests here share exact_mesh.py, hand_models.py
+sys.path.insert(0, str(Path(__file__).parent))  # tests here share exact_mesh.py

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_models import SLIDING, five_fingers
 
 from surehold.grasping.hand.configuration import HandConfig
 from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.inspection import finger_motions, hand_faults
 from surehold.grasping.hand.named import hand_named
 from surehold.grasping.hand.proposal import propose_hand
+from tests.grasping.hand_models import SLIDING, five_fingers
 
 
 @pytest.fixture(params=["hand", "gripper"])

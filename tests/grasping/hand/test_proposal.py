@@ -3,13 +3,13 @@
 import mujoco
 import numpy as np
 import pytest
-from hand_models import SLIDING, TURNING, five_fingers, linkage, three_fingers
 from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
 from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.inspection import finger_motions, hand_faults
 from surehold.grasping.hand.proposal import propose_hand
+from tests.grasping.hand_models import SLIDING, TURNING, five_fingers, linkage, three_fingers
 
 
 @pytest.fixture
@@ -148,7 +148,7 @@ def test_one_of_two_hands_by_its_body(propose):
     found = propose(both, palm="far")
     assert found.config.palm.body == "other_palm"
     assert found.config.fingers["index"][0] == "other_index_spread"
-    with pytest.raises(InputError, match=r"44 joints|38 joints|--palm"):
+    with pytest.raises(InputError, match="38 joints in 10 chains move below"):
         propose(both)
     with pytest.raises(InputError, match="body 'fat' is unknown; did you mean 'far'"):
         propose(both, palm="fat")

@@ -34,7 +34,7 @@ def description_text(proposal: Proposal, model: str) -> str:
         opposed = "  # the others close against it" if finger == proposal.opposed else ""
         lines.append(f"  {_text(finger)}: [{', '.join(map(_text, joints))}]{opposed}")
     if proposal.resting:
-        lines.append(f"# joints that stay at rest: {', '.join(map(_text, proposal.resting))}")
+        lines.append(f"# joints that no finger has, and that stay at rest: {', '.join(map(_text, proposal.resting))}")
     followers = [
         f"{_text(joint)} follows {_text(role[8:])}" for joint, role in proposal.roles.items() if role[:8] == "follows "
     ]

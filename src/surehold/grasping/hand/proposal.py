@@ -53,7 +53,7 @@ class Proposal(NamedTuple):
     roles: Mapping[str, str]
     opposed: str  #: the finger that the others close against
     gripper: bool  #: whether the fingers stand apart in the direction in which they close
-    resting: tuple[str, ...]  #: joints below the palm that no finger has
+    resting: tuple[str, ...]  #: joints below the palm that no finger has and that drive none: they stay at rest
 
 
 def propose_hand(model: str | Path, palm: str = "") -> Proposal:
@@ -97,7 +97,7 @@ def propose_hand(model: str | Path, palm: str = "") -> Proposal:
         "preshapes": {"pinch" if gripper and len(names) == 2 else "power": preshape},
     }
     roles = _roles(hand, bending, opposed)
-    resting = tuple(joint for joint in skeleton.others if not hand.leader_of(joint))
+    resting = tuple(joint for joint in skeleton.others if joint not in roles)
     ranges = {joint: hand.ranges[joint] for joint in roles}
     return Proposal(HandConfig.model_validate(description), ranges, roles, names[opposed], gripper, resting)
 
@@ -143,7 +143,7 @@ def _palm_frame(
     else:
         x, z = _at_right_angles(along, bent)
     turn = np.column_stack([x, np.cross(z, x), z])
-    front = _front_of_palm(hand, z)
+    front = _front_of_palm(hand, x, z, gripper)
     if gripper:
         middle = way.mean(axis=1) @ turn
         meet = int(np.linalg.norm(way - way.mean(axis=1, keepdims=True), axis=2).mean(axis=1).argmin())
@@ -157,13 +157,19 @@ def _middle_of_palm(hand: UndescribedHand) -> Array:
     return poses[:, :, 3].mean(axis=0)
 
 
-def _front_of_palm(hand: UndescribedHand, z: Array) -> float:
-    """Return how far the palm's boxes reach along z, the fingers' first joints where it has none [m]."""
-    poses, half = hand.hand.palm_poses, hand.hand.palm_half_extents
+def _front_of_palm(hand: UndescribedHand, x: Array, z: Array, gripper: bool) -> float:
+    """Return how far the palm's boxes reach along z, the fingers' first joints where it has none [m].
+
+    Of a hand those boxes count that reach to the half of it, along x, where the fingers begin: a wrist is no palm.
+    """
+    poses, half, bases = hand.hand.palm_poses, hand.hand.palm_half_extents, hand.hand.bases
     if not len(poses):
         return float(_middle_of_palm(hand) @ z)
-    reach = np.abs(np.einsum("pij,i->pj", poses[:, :, :3], z) * half).sum(axis=1)
-    return float((poses[:, :, 3] @ z + reach).max())
+    middles = poses[:, :, 3]
+    along, out = (np.abs(np.einsum("pij,i->pj", poses[:, :, :3], axis) * half).sum(axis=1) for axis in (x, z))
+    halfway = 0.5 * ((middles @ x - along).min() + (bases[:, :, 3] @ x).max())
+    counted = (middles @ x + along >= halfway) | gripper
+    return float((middles @ z + out)[counted if counted.any() else slice(None)].max())
 
 
 def _roles(hand: UndescribedHand, bending: Sequence[Mapping[str, float]], opposed: int) -> dict[str, str]:

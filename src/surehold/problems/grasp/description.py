@@ -91,7 +91,10 @@ def described_hand(name: str, config: str, preshape: str = "") -> Hand:
             raise InputError(f"hand-config describes a model file; give that as the hand, not '{name}'.")
         return hand_named(name)
     if not config:
-        raise InputError(f"hand {name} is a model file; describe its palm and fingers with hand-config: a YAML file.")
+        raise InputError(
+            f"hand {name} is a model file; describe its palm and fingers with hand-config: a YAML file, such as "
+            f"`surehold hand new {name}` writes."
+        )
     from surehold.grasping.hand.files import load_hand
 
     return load_hand(name, config)
