@@ -115,7 +115,7 @@ def on_a_line(points, camera):
 
 
 def two_objects(points, camera):
-    return np.vstack([points, points + [0.3, 0.0, 0.0]])
+    return np.vstack([points, points + np.array([0.3, 0.0, 0.0])])
 
 
 def millimeters(points, camera):
