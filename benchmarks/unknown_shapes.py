@@ -1,5 +1,6 @@
-"""Shapes from half views and from touch: `python -m benchmarks.unknown_shapes shape|grasp|explore|time --rows FILE`.
+"""Shapes from half views and from touch: `python -m benchmarks.unknown_shapes WHAT --rows FILE`.
 
+WHAT is one of:
 shape    distance of the true surface to the one believed [mm], mean and 95 %, of half views of 500, 2,000 and 5,000
          points with 0, 1 and 3 mm noise, and the share of true surface points in the believed 95 % interval, of what
          the camera saw and of what it did not, and the share of the believed surface in it. `--training` takes shapes
@@ -7,7 +8,8 @@ shape    distance of the true surface to the one believed [mm], mean and 95 %, o
          chosen on these
 grasp    a grasp is planned on a half view (1,000 points, 1 mm): on 8 draws of the shape, on the mean surface alone, and
          on the cloud mirrored and believed; then it is queried 200 times on the true shape under input noise
-explore  from a box: the true worth of the answer after 20, 40 and 80 trials, beside optimization without a shape
+explore  from a box: the true worth of the answer after 20, 40 and 80 trials
+search   the same of optimization that learns no shape, and after 100 trials
 time     of an update of the shape with 200 contacts
 
 Every finished case is a line of the rows' file: a benchmark that is stopped goes on where it was. Cases are numbered by
@@ -146,37 +148,50 @@ def grasp(objects, args):
 
 
 def explore(objects, args):
-    variables = ("dx", "dy", "dz", "rx", "ry", "rz", "s1")
+    for key, problem, belief in explored(objects, args):
+        run = Exploration(problem, belief, NOISE, seed=key["seed"])
+        real = problem.on(objects[key["object"]])
+        row, cpu = {}, 0.0
+        for k in range(READ_OFF[-1]):
+            started = time.process_time()
+            x = run.ask()
+            touch = touch_trial(real.simulator, problem.pose(x), problem.posture(x))
+            run.tell(x, touch.grasp.quality, touch.observations)
+            cpu += time.process_time() - started
+            if k + 1 in READ_OFF:
+                answer = run.recommend()
+                row[f"explored {k + 1}"], row[f"believed {k + 1}"] = worth(real, answer.x), answer.mean
+        write(args, key, row | {"contacts": len(run.belief.surface.observations.slopes), "cpu": cpu})
+    table(args, ("object",))
+
+
+def search(objects, args):
+    for key, problem, _ in explored(objects, args):
+        real = problem.on(objects[key["object"]])
+        optimizer = sh.Optimizer(problem.box, input_noise=NOISE, seed=key["seed"], n_initial=20)
+        row = {}
+        for k in range(100):
+            x = optimizer.ask()
+            optimizer.tell(x, real(x))
+            if k + 1 in (*READ_OFF, 100):
+                row[f"no shape {k + 1}"] = worth(real, optimizer.recommend().x)
+        write(args, key, row)
+    table(args, ("object",))
+
+
+def explored(objects, args):
+    """Yield the cases that are not done: what names them, the problem in its seven variables, and a box."""
     for seed in range(args.first, args.first + args.views):
         for name, obj in objects.items():
             key = {"object": name, "seed": seed}
-            if known(args, key):
-                continue
-            belief = belief_of_box(obj)
-            problem = GraspProblem(belief.mean_object(), variables=variables)
-            real = problem.on(obj)
+            if not known(args, key):
+                belief = belief_of_box(obj)
+                variables = ("dx", "dy", "dz", "rx", "ry", "rz", "s1")
+                yield key, GraspProblem(belief.mean_object(), variables=variables), belief
 
-            def true(x, real=real):
-                return sh.problems.robust_score(real, x, NOISE, n=200, seed=1).mean
 
-            run = Exploration(problem, belief, NOISE, seed=seed)
-            row = {}
-            started = time.process_time()
-            for k in range(80):
-                x = run.ask()
-                touch = touch_trial(real.simulator, problem.pose(x), problem.posture(x))
-                run.tell(x, touch.grasp.quality, touch.observations)
-                if k + 1 in READ_OFF:
-                    row[f"explored {k + 1}"] = true(run.recommend().x)
-            row["cpu"] = time.process_time() - started
-            optimizer = sh.Optimizer(problem.box, input_noise=NOISE, seed=seed, n_initial=20)
-            for k in range(100):
-                x = optimizer.ask()
-                optimizer.tell(x, real(x))
-                if k + 1 in (*READ_OFF, 100):
-                    row[f"today {k + 1}"] = true(optimizer.recommend().x)
-            write(args, key, row)
-    table(args, ("object",))
+def worth(real, x):
+    return sh.problems.robust_score(real, x, NOISE, n=200, seed=1).mean
 
 
 def timed(objects, args):
@@ -226,7 +241,7 @@ def table(args, names):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("shape", "grasp", "explore", "time"))
+    parser.add_argument("what", choices=("shape", "grasp", "explore", "search", "time"))
     parser.add_argument("--rows", default="/dev/null")
     parser.add_argument("--views", type=int, default=3)
     parser.add_argument("--first", type=int, default=0)
@@ -239,7 +254,7 @@ def main():
     args = parser.parse_args()
     objects = training_objects() if args.training else {n: shipped_object(n) for n in args.objects.split(",")}
     with threadpool_limits(1):
-        {"shape": shape, "grasp": grasp, "explore": explore, "time": timed}[args.what](objects, args)
+        {"shape": shape, "grasp": grasp, "explore": explore, "search": search, "time": timed}[args.what](objects, args)
 
 
 if __name__ == "__main__":

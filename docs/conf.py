@@ -68,6 +68,8 @@ copybutton_prompt_is_regexp = True
 
 # --- reference -------------------------------------------------------------------------------------------------------
 autodoc_typehints = "signature"
+maximum_signature_line_length = 80  # longer ones have a line for each parameter
+toc_object_entries_show_parents = "hide"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
 autosummary_generate = True
@@ -82,6 +84,8 @@ sphinx_gallery_conf = {
     "examples_dirs": [str(DOCS.parent / "examples" / "gallery")],
     "gallery_dirs": ["generated/gallery"],
     "filename_pattern": r".*\.py$",
+    "subsection_order": [f"../examples/gallery/{name}" for name in ("noise", "trials", "models", "grasps")],
+    "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": True,
     "image_scrapers": ("matplotlib",),
     "download_all_examples": False,

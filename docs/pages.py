@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import json
 from pathlib import Path
 from typing import Final
 
@@ -27,8 +28,18 @@ Made from the tables in `results/`, which hold every run with its trace, setting
 on two cores of a virtual x86-64 machine, one process a run and one thread a process; times are CPU seconds. A number
 without enough runs behind it says how many it has: 5 of 20.
 
-How long an ask takes with n trials, how a campaign scales with workers, calibration, closing and quality of grasps:
-`make bench`, or `python -m benchmarks.NAME` for one.
+How long it all takes is on the page of {doc}`speed <speed>`; calibration, closing and quality of grasps:
+`python -m benchmarks.NAME`.
+"""
+
+SPEED: Final = """# Speed and size
+
+Made from `results/benchmarks/{name}`, which `make bench` stored on {machine}; {load}. Times are CPU seconds of
+one core, or wall seconds where several processes work. *Asked* is what each row was meant to take at most: of asks a
+share of the time of Optuna's GPSampler and of BoTorch in the same run, of others a fixed time. The *floor* is the least
+that has to be done: LAPACK's factorization of the trials' matrix (asks), a copy of the trials in memory (studies), one
+look at the distance field (grasps). The yardstick of the machine, took {yardstick:.3f} ms (dpotrf of
+140 x 140).
 """
 
 
@@ -54,6 +65,7 @@ def write(folder: Path) -> None:
     for package, about in {**PACKAGES, **MODULES}.items():
         _write(folder / f"{package}.rst", _reference(package, about))
     _write(folder / "benchmarks.md", _benchmarks())
+    _write(folder / "speed.md", _speed())
 
 
 def _benchmarks() -> str:
@@ -73,6 +85,20 @@ def _benchmarks() -> str:
         parts += [f"## {section.title}", section.text, f"Plan `{plan}`.", markdown_table(section.tables[0])]
         parts.append("Made with " + ", ".join(f"{name} {version}" for name, version in versions) + ".")
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _speed() -> str:
+    """Return the last table of `make bench`."""
+    path = max(ROOT.glob("results/benchmarks/*.json"))
+    stored = json.loads(path.read_text(encoding="utf-8"))
+    load = f"{stored['load']:.0f} processes wanted to run at its start"
+    text = SPEED.format(name=path.name, machine=stored["machine"], load=load, yardstick=1e3 * stored["yardstick"])
+    lines = ["| | seconds | times asked | times the floor | MB |", "|---|---|---|---|---|"]
+    for name, row in stored["rows"].items():
+        ratios = [f"{row['seconds'] / row[limit]:.3g}" if limit in row else "" for limit in ("asked", "floor")]
+        held = f"{row['megabytes']:.0f}" if "megabytes" in row else ""
+        lines.append(f"| {name} | {row['seconds']:.4g} | {' | '.join(ratios)} | {held} |")
+    return "\n".join([text, *lines]) + "\n"
 
 
 def _reference(package: str, about: str) -> str:

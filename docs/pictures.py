@@ -1,11 +1,13 @@
-"""The README's picture and the numbers beside it, made by the program itself: `make pictures`.
+"""The README's picture with the numbers beside it, and the paper's figure, made by the program: `make pictures`.
 
-`docs/mug.json` holds what the picture shows; a test runs the same seed again and compares.
+`docs/mug.json` holds what the picture shows; a test runs the same seed again and compares. The paper's figure comes
+from the runs in `results/peers`.
 """
 
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from shutil import copyfile
 from tempfile import TemporaryDirectory
@@ -13,6 +15,7 @@ from typing import Any, Final
 
 DOCS: Final = Path(__file__).parent
 COMMAND: Final = ("grasp", "mug", "--seed", "0")
+PAPER: Final = DOCS.parent / "packaging" / "paper"
 
 
 def shown(folder: Path) -> dict[str, Any]:
@@ -32,8 +35,20 @@ def run(folder: Path) -> dict[str, Any]:
     return shown(folder)
 
 
+def peers(results: Path, path: Path) -> None:
+    """Draw the mean under the input noise by trial, of all methods on the mixture of Gaussians, from stored runs."""
+    from surehold.campaigns.report import read_campaigns
+    from surehold.campaigns.sections import campaign_section
+    from surehold.reports.campaign_figures import draw_picture
+
+    picture = campaign_section(read_campaigns([results])["peers"]).pictures[0]
+    panel = next(one for one in picture.panels if one.title == "GM" and one.ylabel.startswith("mean"))
+    draw_picture(replace(picture, panels=(panel,))).savefig(path, dpi=200)
+
+
 def main() -> None:
-    """Write mug.png and mug.json."""
+    """Write mug.png, mug.json and the paper's peers.png."""
+    peers(DOCS.parent / "results" / "peers", PAPER / "peers.png")
     with TemporaryDirectory() as folder:
         numbers = run(Path(folder))
         copyfile(Path(folder, "figures", "overview.png"), DOCS / "mug.png")

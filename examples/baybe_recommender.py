@@ -69,7 +69,7 @@ def campaign(n: int) -> tuple[sh.Recommendation, np.ndarray]:
     f = sh.problems.GM()
     limits = zip(f.box.names, f.box.lower, f.box.upper, strict=True)
     space = SearchSpace.from_product([NumericalContinuousParameter(name, (a, b)) for name, a, b in limits])
-    recommender = RobustRecommender(sh.InputNoise.unit(0.1), seed=0)
+    recommender = RobustRecommender(sh.InputNoise.unit(0.1), seed=2)
     campaign = Campaign(space, NumericalTarget("value").to_objective(), recommender)
     for _ in range(n):
         batch = campaign.recommend(1)

@@ -48,3 +48,11 @@ def test_no_name_hides_behind_a_module_of_the_same_name(package):
     root = import_module(package)
     modules = {module.name for module in pkgutil.iter_modules(root.__path__)}
     assert not modules & (set(root.__all__) - {"grasping", "problems"})
+
+
+def test_what_people_print_is_short():
+    box = sh.Box({"x": (0.0, 1.0)})
+    for shown in (sh.GaussianProcess(), sh.TreedGaussianProcess(), sh.Optimizer(box), box, sh.InputNoise.unit(0.03)):
+        assert repr(shown).lstrip("<").startswith(type(shown).__name__)
+        assert " at 0x" not in repr(shown)
+        assert len(repr(shown)) < 130

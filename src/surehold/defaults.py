@@ -184,8 +184,9 @@ CURVATURE_STEP: Final = 0.05
 RELEARNT_DIVISOR: Final = 16
 SURPRISE: Final = 4.0
 #: Trials up to which a process takes all of them together: its cost grows with their cube. Beyond, hyperparameters are
-#: learnt from about so many of them. Time: python -m benchmarks.growth. Runs in 6 to 20 variables that switched at 100
-#: lost precision, so the switch is late; its effect on the result was never measured at this number.
+#: learnt from about so many of them. Time: python -m benchmarks.growth. The switch is late, for it loses precision:
+#: made at 300 or 600 trials, regrets after 40 more are 2.1 and 3.4 times as large in 6 exact variables (0.33 +- 0.16
+#: and 0.53 +- 0.31 decades); in 3 variables under noise both stay below 1e-3: python -m benchmarks.switch
 MANY: Final = 800
 MANY_LEARNT: Final = 200
 #: Trials that a query is then answered from: the nearest of all, of every eighth, of every 64th.
@@ -292,8 +293,8 @@ FAILURE_SIGNALS: Final = (1.0, 10.0, 100.0, 1e3, 1e5)
 #: fails are worth their small chance again and again: on the edge of failure 41.6 evaluations to 1 %, with the second
 #: 21.8 (5 training seeds). python -m benchmarks.failures
 FAILURE_POWER: Final = 2.0
-#: Trials up to which failures are modelled where nothing is said: an ask takes 0.8 s at 200 and 6 s at 400, the third
-#: power of their number; beyond, a failed trial counts as the lowest value. Timed once; otherwise never measured.
+#: Trials up to which failures are modelled where nothing is said: the model takes 0.8 s at 200 and 3 s from 400 on
+#: (CPU, three variables); beyond, a failed trial counts as the lowest value. Timed once; otherwise never measured.
 FAILURES_MODELLED: Final = 200
 #: Under input noise a trial may become the answer where executions succeed with this share of the best probability
 #: among trials, if they do not with `FEASIBLE`: few failures leave the model unsure everywhere. Never measured.
@@ -313,6 +314,10 @@ BETA_PRIOR: Final = (1.0, 1.0)
 SUCCESS_BURN_IN: Final = 20
 #: Joint draws by which the spread of a share of successes under the input noise is known. Never measured.
 SUCCESS_DRAWS: Final = 64
+#: Places that the probit model takes at most: beyond, trials near each other count as several executions at their mean,
+#: and hyperparameters are learnt from `MANY_LEARNT` of them. An ask of 800 trials takes as long as one of 400.
+#: python -m benchmarks.success_outcomes --problems "" --methods success --sizes 100,400,800,10000
+SUCCESS_PLACES: Final = 400
 #: A place whose probability of success is known to this standard deviation is settled: it is not tried again as long
 #: as there are others. After the estimation bounds of Tesch et al. 2013. Never measured against others.
 SETTLED: Final = 0.02

@@ -16,6 +16,7 @@ from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.recommendation import Recommendation
 from surehold.optimization.trials import AskedTrial
+from surehold.optimization.values import LARGEST, LARGEST_SQUARED
 
 try:
     from gest_api.generator import Generator
@@ -133,14 +134,14 @@ class RobustGenerator(Generator):
             else:
                 raise InputError(f"point {number!r} is not under way; leave _id out of points that others suggested.")
             value = result.get(self._objective)
-            if value is None or not np.isfinite(value):
+            if value is None or not abs(value) <= LARGEST:
                 self.optimizer.tell(place, failed=True)
                 continue
             outputs = {name: result[name] for name in self.vocs.constraints}
             self.optimizer.tell(
                 place,
                 float(value),
-                constraints={name: v if np.isfinite(v) else None for name, v in outputs.items()} or None,
+                constraints={name: v if abs(v) <= LARGEST_SQUARED else None for name, v in outputs.items()} or None,
             )
 
     def recommend(self) -> Recommendation:

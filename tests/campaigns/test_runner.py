@@ -6,11 +6,14 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
 
-from surehold.campaigns.plan import MethodSetup, ProblemSetup
+from surehold.campaigns import runner
+from surehold.campaigns.plan import MethodSetup, ProblemSetup, Task
 from surehold.campaigns.runner import Progress, checked_backend, run_campaign
 from surehold.campaigns.single_run import TIMES
 from surehold.campaigns.table import opened, read_folder
@@ -206,3 +209,32 @@ def test_bad_arguments_are_refused(tmp_path, cheap):
 def test_a_locked_folder_is_refused(tmp_path, cheap):
     with opened(tmp_path, cheap), pytest.raises(InputError, match="another process"):
         run_campaign(cheap, tmp_path)
+
+
+def test_short_runs_travel_together_and_long_ones_alone(monkeypatch):
+    """A parcel ends in time, what it has not begun comes back, and every run is made once."""
+    clock, sizes = [0.0], []
+    seconds = {seed: 0.01 if seed < 60 else 5.0 for seed in range(70)}
+
+    def run(cell, seed):
+        clock[0] += seconds[seed]
+        return {"seed": seed}
+
+    class Here(Executor):
+        def submit(self, function, *arguments):
+            future = Future()
+            sizes.append(len(arguments[0]))
+            future.set_result(function(*arguments))
+            return future
+
+    @contextmanager
+    def pool(*_):
+        yield Here(), lambda: 1
+
+    monkeypatch.setattr(runner, "run_once", run)
+    monkeypatch.setattr(runner, "_pool", pool)
+    monkeypatch.setattr(runner.time, "monotonic", lambda: clock[0])
+    rows = list(runner._spread([Task(None, seed) for seed in seconds], 1, "loky", ""))
+    assert sorted(row["seed"] for row in rows) == list(seconds)
+    assert max(sizes) > 10, "short runs travelled alone"
+    assert sizes[-1] <= 2, "long runs travelled together"

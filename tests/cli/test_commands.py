@@ -9,6 +9,8 @@ import pytest
 import yaml
 
 from surehold.cli import run
+from surehold.optimization.success import SUCCESS_SURROGATES
+from surehold.optimization.surrogates.named import SURROGATES
 from surehold.reports import files
 
 OWN = """
@@ -247,7 +249,11 @@ def test_a_run_without_any_grasp_says_so_first(here, capsys):
     assert out.index("None of 3 trials") < out.index("pose")
     page = (here / "slippery" / "report.html").read_text(encoding="utf-8")
     assert '<p class="headline">None of 3 trials succeeded' in page
-    assert "No success: " in page
+    assert "No success: the highest trial" in page
+    assert "no success: the highest trial" in out
+    told = re.sub(r"<script.*?</script>|<style.*?</style>|<dl.*?</dl>", "", page, flags=re.DOTALL)
+    assert "ecommended" not in told + out
+    assert "Recommended" not in page
 
 
 def test_doctor_compiles_for_images(capsys, monkeypatch):
@@ -276,6 +282,12 @@ def test_doctor_version_and_help(capsys):
     assert capsys.readouterr().out.startswith("surehold 0.")
     assert run(["grasp", "--help"]) == 0
     assert "--facet" in capsys.readouterr().out
+
+
+def test_doctor_says_how_to_install_what_is_missing(capsys, monkeypatch):
+    monkeypatch.setattr("surehold.extras.missing", lambda extra: ["libigl"] if extra == "mesh" else [])
+    assert run(["doctor"]) == 0
+    assert "without libigl: pip install 'surehold[mesh]'" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(("group", "command"), [("", "maximize"), ("campaign", "report"), ("study", "recommend")])
@@ -352,6 +364,25 @@ def test_a_study_minimizes(here, capsys):
     assert surehold("study recommend down") == 0
     assert surehold("study create up --parameters x=0:1 --direction sideways") == 2
     assert "maximize" in capsys.readouterr().err
+
+
+def test_the_surrogate_is_chosen_by_name(here, capsys):
+    (here / "rig.py").write_text("def held(x):\n    return bool(0.4 < x[0] < 0.8)\n")
+    assert surehold("maximize --help") == 0
+    shown = capsys.readouterr().out
+    for name in (*SURROGATES, *SUCCESS_SURROGATES):
+        assert name in shown, name
+    line = "--bounds x=0:1 --noise 0.03 --trials 6 --initial 4"
+    assert surehold(f"maximize rig.py:held {line} --surrogate tpg") == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "'tpg' is unknown; did you mean 'tgp'? Choose one of: two_scales, gp, tgp, local_global." in told
+    assert surehold(f"maximize rig.py:held {line} --outcome success --surrogate beta") == 2
+    assert "hoose one of: probit, beta_process." in " ".join(capsys.readouterr().err.split())
+    assert surehold(f"maximize rig.py:held {line} --outcome success --surrogate beta_process --out found") == 0
+    found = json.loads((here / "found" / "result.json").read_text())
+    assert found["settings"]["surrogate"] == "beta_process"
+    assert surehold(f"maximize rig.py:held {line} --outcome success --out probit") == 0
+    assert json.loads((here / "probit" / "result.json").read_text())["trials"] != found["trials"]
 
 
 def test_a_run_of_successes_speaks_of_shares(here, capsys):

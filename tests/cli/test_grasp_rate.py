@@ -48,6 +48,13 @@ def test_a_run_is_rated_as_it_was(block, capsys):
     assert "friction 0.3" in rated("held/grasps.yaml --friction 0.3", capsys)
 
 
+def test_a_name_in_brackets_is_shown_whole(block, capsys):
+    content = yaml.safe_load((block / "grasps.yaml").read_text())
+    content["grasps"] = {"[bold]": next(iter(content["grasps"].values()))}
+    (block / "grasps.yaml").write_text(yaml.safe_dump(content))
+    assert "[bold]" in rated("held/grasps.yaml", capsys)
+
+
 def test_rated_grasps_are_written_in_another_format(block, capsys):
     rated("held/grasps.yaml --out again --format graspgen", capsys)
     before, now = read_grasps(block / "grasps.yaml"), read_grasps(block.parent / "again" / "grasps.yaml")

@@ -76,6 +76,18 @@ def test_a_robot_by_commands(study, here):
     assert len(lines) == 10
 
 
+def test_stop_says_when_asking_ends(study, capsys):
+    study(CREATE)
+    for options, words in (
+        ("--trials 3", "open, ends after 3 trials in all\n"),
+        ("--trials 3 --improvement 0.01", "open, ends after 3 trials in all, or when 3 trials in a row promise less"),
+        ("--hours 1", "open, ends at 2"),
+        ("", "open, never ends by itself"),
+    ):
+        assert run(["study", "stop", "mug", *options.split()]) == 0
+        assert words in capsys.readouterr().out
+
+
 def test_people_by_commands(study):
     study(CREATE)
     study("ask mug")
@@ -91,6 +103,17 @@ def test_people_by_commands(study):
     assert study("stop mug --hours 1 --improvement 0.01 --asks 2")["stop_rule"]["asks"] == 2
     assert study("stop mug")["stop_rule"]["trials"] is None
     assert study("ask mug")["id"] == 3
+
+
+def test_a_fault_of_the_rig_and_a_wild_reading(study, capsys):
+    study(CREATE)
+    study("ask mug")
+    assert study("tell mug 0 --rig")["state"] == "waiting"
+    assert study("ask mug")["again"]
+    for value in (0.1, 0.5, -30, 0.3, 0.4):
+        study(f"add mug {value} --at dx={0.04 * abs(value) % 0.05},dy=0")
+    assert run(["study", "recommend", "mug"]) == 0
+    assert "Trial 3 gave a value so far on the bad side" in " ".join(capsys.readouterr().out.split())
 
 
 def test_plain_answers_are_for_people(capsys):

@@ -102,6 +102,66 @@ def test_bad_input_is_one_line(line, said, capsys):
     assert error.count("\n") == 1
 
 
+def nothing(points, camera):
+    return points[:0]
+
+
+def not_numbers(points, camera):
+    return np.full_like(points, np.nan)
+
+
+def on_a_line(points, camera):
+    return np.linspace(0.0, 0.1, 100)[:, None] * [1.0, 0.5, 0.0]
+
+
+def two_objects(points, camera):
+    return np.vstack([points, points + np.array([0.3, 0.0, 0.0])])
+
+
+def millimeters(points, camera):
+    return 1000.0 * points
+
+
+def of_the_hand(points, camera):
+    """The object, far behind fingers that hold the camera."""
+    near = camera + 0.2 * (points - camera)
+    return np.vstack([points[::3], near + 0.02 * np.cross(camera, [0.0, 0.0, 1.0])])
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (nothing, "holds no points; give a cloud"),
+        (not_numbers, "has 0 finite points; give 20 or more"),
+        (on_a_line, "a surface is needed: check the columns"),
+        (two_objects, "give one of them"),
+        (millimeters, "give --unit mm"),
+        (of_the_hand, "take out those of the hand that carries the camera"),
+    ],
+)
+def test_a_cloud_of_which_nothing_can_be_made_is_refused_in_one_line(here, capsys, made, said):
+    with np.load("bottle.npz") as file:
+        np.savez("bad.npz", points=made(file["points"], file["camera"]), camera=file["camera"])
+    assert surehold("grasp --cloud bad.npz --out out") == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert not (here / "out").exists()
+
+
+def test_contacts_that_contradict_a_cloud_or_themselves_are_refused(here, capsys):
+    def told(rows):
+        (here / "touched.json").write_text(json.dumps({"contacts": rows}))
+        assert surehold("grasp --cloud bottle.npz --contacts touched.json") == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1
+        return error
+
+    place = np.load("bottle.npz")["points"][0].tolist()
+    assert "normals 180 degrees" in told([{"point": place, "normal": [v, 0, 0]} for v in (1, -1)])
+    assert "mm off the surface" in told([{"point": [0.0, 0.0, 0.6], "normal": [0, 0, 1]}])
+
+
 def test_a_robot_tells_contacts_and_the_next_trial_follows_from_them(here, capsys):
     made = surehold("explore --box 0.06,0.06,0.2 --study cup --variables dx,dy --facet right-front --seed 3")
     assert made == 0

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,10 @@ def test_benchmarks_are_of_the_results(tmp_path):
     text = (tmp_path / "benchmarks.md").read_text()
     assert "| RKHS | surehold robust | mean under input noise |" in text
     assert "Made with surehold" in text
+    stored = json.loads(max(ROOT.glob("results/benchmarks/*.json")).read_text())
+    name, row = next((name, row) for name, row in stored["rows"].items() if "asked" in row)
+    speed = (tmp_path / "speed.md").read_text()
+    assert f"| {name} | {row['seconds']:.4g} | {row['seconds'] / row['asked']:.3g} |" in speed
 
 
 def rows_of_validation():
@@ -102,3 +107,26 @@ def test_the_version_is_the_same_everywhere():
         found = re.search(pattern, (ROOT / path).read_text(encoding="utf-8"), re.MULTILINE)
         assert found is not None, path
         assert found[1] == sh.__version__, f"{path} has version {found[1]}"
+
+
+RECIPE = ROOT / "packaging/conda/recipe.yaml"
+
+
+def test_the_conda_recipe_asks_for_what_the_wheel_does():
+    import yaml
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    asked = [
+        *project["dependencies"],
+        *(one for extra in ("campaign", "cli", "grasp", "report") for one in extras[extra]),
+    ]
+    asked = {one.lower().replace("matplotlib", "matplotlib-base") for one in asked if not one.startswith("surehold")}
+    recipe = yaml.safe_load(RECIPE.read_text(encoding="utf-8"))
+    assert {one.replace(" ", "") for one in recipe["requirements"]["run"][1:]} == asked
+
+
+def test_the_conda_recipe_renders():
+    rattler_build = pytest.importorskip("rattler_build")
+    (variant,) = rattler_build.Stage0Recipe.from_file(str(RECIPE)).render(rattler_build.VariantConfig())
+    assert variant.recipe.package.version == sh.__version__

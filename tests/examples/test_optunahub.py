@@ -23,7 +23,7 @@ def test_the_loop_of_optuna_ends_with_what_holds():
     module = optunahub.load_local_module("samplers/surehold", registry_root=str(HUB))
     f, noise = sh.problems.GM(), module.InputNoise.unit(0.1)
     space = dict(zip(f.box.names, zip(f.box.lower, f.box.upper, strict=True), strict=True))
-    sampler = module.SureholdSampler(space, input_noise=noise, seed=0)
+    sampler = module.SureholdSampler(space, input_noise=noise, seed=2)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     study = optuna.create_study(direction="maximize", sampler=sampler)
     study.optimize(lambda trial: float(f([trial.suggest_float(name, *space[name]) for name in space])), n_trials=50)
@@ -32,4 +32,4 @@ def test_the_loop_of_optuna_ends_with_what_holds():
     best = sh.problems.robust_optimum(f, noise).x
     held, spike, most = (sh.problems.robust_score(f, x, noise, n=2000, seed=1).mean for x in (answer, highest, best))
     assert held > 0.9 * most
-    assert held > spike
+    assert held > 1.1 * spike

@@ -19,7 +19,12 @@ def example(name):
 
 @pytest.mark.filterwarnings("ignore")  # of the other libraries and what they import
 @pytest.mark.parametrize(
-    ("library", "name", "loop"), [("baybe", "baybe_recommender", "campaign"), ("pymoo", "pymoo_algorithm", "run")]
+    ("library", "name", "loop"),
+    [
+        ("ax", "ax_generation_node", "run"),
+        ("baybe", "baybe_recommender", "campaign"),
+        ("pymoo", "pymoo_algorithm", "run"),
+    ],
 )
 def test_the_loop_ends_with_what_holds(library, name, loop):
     pytest.importorskip(library)
@@ -28,4 +33,4 @@ def test_the_loop_ends_with_what_holds(library, name, loop):
     best = sh.problems.robust_optimum(f, noise).x
     held, spike, most = (sh.problems.robust_score(f, x, noise, n=2000, seed=1).mean for x in (answer.x, observed, best))
     assert held > 0.9 * most
-    assert held > spike
+    assert held > 1.1 * spike, "the seed is one of those with which the loop observes the spike, too"

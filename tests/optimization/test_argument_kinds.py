@@ -5,6 +5,7 @@ import pytest
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
+from surehold.optimization.evaluation import evaluate
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 
@@ -73,6 +74,32 @@ def test_values_at_the_ends_of_the_numbers_do_no_harm(values):
     assert BOX.contains(optimizer.ask())
 
 
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        ({}, {"y": 1e308}),
+        ({"noise": "told"}, {"y": 1.0, "noise": 1e200}),
+        ({"constraints": {"torque": (None, 1.0)}}, {"y": 1.0, "constraints": {"torque": -1e308}}),
+    ],
+)
+def test_numbers_of_which_no_model_can_be_made_are_refused(settings, told):
+    optimizer = Optimizer(BOX, seed=0, **settings)
+    with pytest.raises(InputError, match=r"another unit|1e\+150") as refused:
+        optimizer.tell([0.5, 0.5], **told)
+    assert "\n" not in str(refused.value)
+    assert len(optimizer.y) == 0
+    y, noise, torque = told["y"], told.get("noise"), told.get("constraints", {}).get("torque")
+    rows = {"noise": None if noise is None else [noise], "outputs": None if torque is None else [[torque]]}
+    with pytest.raises(InputError, match=r"1e\+300|1e\+150"):
+        optimizer.restore([[0.5, 0.5]], [y], **rows)
+
+
+def test_a_function_that_returns_such_a_number_has_failed():
+    value, why, _ = evaluate(lambda x: -1e308, np.zeros(1))
+    assert np.isnan(value)
+    assert why == "returned -1e+308"
+
+
 def test_numbers_beyond_the_range_of_floats():
     huge = 10**400
     for name in ("k", "kappa", "noise", "feasible"):
@@ -88,3 +115,13 @@ def test_numbers_beyond_the_range_of_floats():
     optimizer = Optimizer(BOX, constraints={"torque": (None, 0.0)})
     with pytest.raises(InputError, match="torque"):
         optimizer.tell([0.5, 0.5], 1.0, constraints={"torque": huge})
+
+
+def test_counts_beyond_measure():
+    for f in (
+        lambda: Optimizer(BOX).ask(10**9),
+        lambda: Optimizer(BOX, n_initial=10**9).ask(),
+        lambda: Box.unit(10**9),
+    ):
+        with pytest.raises(InputError, match="0,000"):
+            f()

@@ -30,7 +30,7 @@ def test_a_wild_reading_counts_as_the_lowest_other_value():
         [0.0, 0.0, 0.0, 0.1, -0.05, -0.04],  # grasps: mostly nothing, some collisions
         (-np.geomspace(0.1, 2000.0, 40)).tolist(),  # a valley such as Rosenbrock's
         [0.5, 0.6, -30.0, -31.0, -29.0],  # a third and more: a part of the response
-        [1e308, -1e308, 0.0, 1e307],
+        [1e300, -1e300, 0.0, 1e299],
     ],
 )
 def test_values_that_belong_to_the_response_stay(values):

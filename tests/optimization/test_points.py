@@ -8,6 +8,7 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.points import points_of
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 
 NAMES = ("dx", "dy")
 BOX = Box({"dx": (0.0, 1.0), "dy": (0.0, 2.0)})
@@ -44,6 +45,36 @@ def test_a_table_is_read_by_its_columns():
     optimizer.restore(table, [1.0, 2.0, 3.0])
     np.testing.assert_allclose(optimizer.X, table[["dx", "dy"]])
     assert optimizer.predict(table)[0].shape == (3,)
+
+
+@pytest.mark.parametrize("box", [BOX, Box({"dx": (0.0, 1.0), "dy": (0, 2, "int")})], ids=repr)
+@pytest.mark.parametrize("kind", [dict, pandas.Series])
+def test_a_list_of_named_points_is_read_by_their_names(box, kind):
+    rows = [kind({"dy": 1.0, "dx": 0.4}), kind({"dx": 0.5, "dy": 2.0})]
+    np.testing.assert_array_equal(box.points(rows), [[0.4, 1.0], [0.5, 2.0]])
+    with pytest.raises(InputError, match="dx, dy"):
+        box.points([rows[0], [0.5, 2.0]])
+
+
+WRONG = {
+    "masked": np.ma.array([1.0, 2.0], mask=[True, False]),
+    "a date": np.array(["2020-01-01", "2020-01-02"], dtype="datetime64[D]"),
+    "complex": [1.0, 2j],
+    "not numeric": ["good", 1.0],
+}
+
+
+@pytest.mark.parametrize("words", WRONG)
+def test_columns_of_stored_trials_are_numbers(words):
+    rows, told = [[0.1, 0.2], [0.3, 0.4]], Optimizer(BOX, noise="told", constraints={"torque": (None, 1.0)})
+    outputs = np.reshape(WRONG[words], (2, 1))
+    for name, settings in {"y": {}, "noise": {"noise": WRONG[words]}, "outputs": {"outputs": outputs}}.items():
+        with pytest.raises(InputError, match=f"^{name} .*{words}"):
+            told.restore(rows, WRONG[words] if name == "y" else [1.0, 2.0], **settings)
+    for data in ((rows, WRONG[words]), (np.column_stack([WRONG[words], WRONG[words]]), [1.0, 2.0])):
+        if not (data[0] is not rows and words == "masked"):  # stacked columns lose their mask
+            with pytest.raises(InputError, match="numeric"):
+                GaussianProcess().fit(*data)
 
 
 @pytest.mark.parametrize(

@@ -133,6 +133,21 @@ def test_values_and_successes_are_not_mixed():
         optimizer.tell([0.5], success=True)
 
 
+def test_surrogates_of_successes_by_name():
+    def third(**settings):
+        optimizer = sh.Optimizer(BOX, outcome="success", n_initial=2, seed=0, **settings)
+        for success in (True, False):
+            optimizer.tell(optimizer.ask(), success=success)
+        return optimizer.ask()
+
+    assert np.array_equal(third(), third(surrogate="probit"))
+    assert not np.array_equal(third(), third(surrogate="beta_process"))
+    with pytest.raises(InputError, match=r"'bta_process'.*did you mean 'beta_process'.*hoose one of: probit, beta_pro"):
+        third(surrogate="bta_process")
+    with pytest.raises(InputError, match="'probit' is of successes; say outcome='success'"):
+        sh.Optimizer(BOX, surrogate="probit")
+
+
 @pytest.mark.parametrize(
     "settings", [{"direction": "minimize"}, {"noise": 0.1}, {"risk": "cvar"}, {"surrogate": "tgp"}]
 )
@@ -241,8 +256,8 @@ def test_of_many_successes_the_early_ones_are_not_all_that_is_looked_at():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"surrogate": "beta_process"}, "counts successes; say outcome='success'"),
-        ({"surrogate": "beta", "outcome": "success"}, "surrogate='beta' cannot be combined .*'beta_process'"),
+        ({"surrogate": "beta_process"}, "is of successes; say outcome='success'"),
+        ({"surrogate": "beta", "outcome": "success"}, "'beta' is unknown; choose one of: probit, beta_process"),
         ({"surrogate": sh.GaussianProcess(), "outcome": "success"}, "cannot be combined with outcome='success'"),
     ],
 )

@@ -189,3 +189,9 @@ def test_rules_are_of_the_variables_not_of_their_coordinates():
 def test_a_box_shows_what_nobody_sets():
     box = Box({"x": (0.0, 1.0)}, uncontrolled={"payload": [0.5, 1.0, 1.5]})
     assert repr(box) == "Box({'x': (0, 1), 'payload': (0.5, 1.5)}, uncontrolled: payload)"
+
+
+def test_half_a_character_is_refused():
+    for bounds in ({"\ud800": (0.0, 1.0)}, {"grip": ["pinch", "\udfff"]}):
+        with pytest.raises(InputError, match="half a character"):
+            Box(bounds)

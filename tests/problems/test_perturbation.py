@@ -69,9 +69,9 @@ def test_failures_are_counted_not_scored():
     assert np.isnan(lost.quantile(0.5))
 
 
-@pytest.mark.parametrize("n", [0, -1, 2.5, True])
+@pytest.mark.parametrize("n", [0, -1, 2.5, True, 10**12])
 def test_bad_counts(n):
-    with pytest.raises(InputError, match="integer of 1 or more"):
+    with pytest.raises(InputError, match="integer from 1 to"):
         robust_score(RKHS(), [0.5], InputNoise.unit(0.01), n=n)
 
 
@@ -83,3 +83,14 @@ def test_bad_points():
         robust_score(RKHS(), [[0.5], [0.6]], noise)
     with pytest.raises(InputError, match="level"):
         robust_score(RKHS(), [0.5], noise, n=5).quantile(1.5)
+
+
+@pytest.mark.parametrize(
+    ("noise", "words"),
+    [(0.03, r"InputNoise\.unit\(0\.03\)"), ({"x": 0.03}, r"give sh\.InputNoise\(\{'x'"), (None, "is None")],
+)
+def test_what_is_no_input_noise_names_the_right_call(noise, words):
+    p = RKHS()
+    for score in (robust_score, lambda p, x, noise: p.expectation(x, noise)):
+        with pytest.raises(InputError, match=words):
+            score(p, [0.5], noise)

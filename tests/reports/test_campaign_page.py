@@ -74,6 +74,17 @@ def test_the_climb_out_of_the_initial_design_does_not_press_the_rest_flat():
     assert axes.get_ylim()[0] > 0.0
 
 
+@pytest.mark.parametrize("panels", [1, 2, 4])
+def test_the_names_of_eight_methods_fit_into_the_figure(panels):
+    names = ("surehold robust", "surehold", "Optuna GPSampler", "Optuna TPE", "Optuna CMA-ES", "BoTorch", "random")
+    panel = Panel("p", lines=tuple(Line(X, X, name) for name in (*names, "BoTorch input perturbation")))
+    figure = draw_picture(Picture("p", "", (panel,) * panels))
+    figure.draw_without_rendering()
+    shown = figure.legends[0].get_window_extent()
+    assert shown.x0 >= 0
+    assert shown.x1 <= figure.bbox.x1
+
+
 def test_rows_of_another_length_are_refused():
     for changes in ({"rows": (("1",),)}, {"marks": ("good",)}):
         with pytest.raises(InputError, match="other lengths"):

@@ -20,6 +20,19 @@ def test_answers_and_traces(gm_result, gm_report):
     np.testing.assert_allclose(gm_report.noise, 0.01 * np.eye(2))
 
 
+def test_the_answer_over_conditions_is_the_trial_of_its_setting():
+    """The nearest trial in all variables would be one of another setting, made at about the mean condition."""
+    box = sh.Box({"x": (0.0, 1.0)}, uncontrolled={"w": [0.0, 0.0, 0.5, 1.0, 1.0]})
+    result = sh.maximize(lambda p: -((p[0] - 0.6) ** 2) * (1.0 + p[1]), box, 9, seed=0)
+    x = result.recommendation.x
+    index = gather.answers(result)["recommended"]
+    assert result.X[index, 0] == pytest.approx(x[0], abs=1e-9)
+    nearest = int(np.argmin(np.abs(box.to_unit(result.X) - box.to_unit(x)).max(axis=1)))
+    assert abs(result.X[nearest, 0] - x[0]) > 1e-6, "the nearest trial is the right one: the test shows nothing"
+    np.testing.assert_allclose(gather.candidate(result, "recommended", index, None).x, x)
+    assert x[1] == pytest.approx(0.5)
+
+
 def test_surfaces_are_the_model(gm_result, gm_report):
     view = gm_report.surfaces[0]
     corner = np.array([[view.axes[0][7], view.axes[1][50]]])

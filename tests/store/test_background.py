@@ -82,8 +82,19 @@ def test_a_child_that_cannot_start_is_said_in_one_line(tmp_path):
     assert said[1:] == ["0 0", "['warm-x.lock']"]
 
 
-def test_a_folder_that_cannot_be_written_is_left_alone(tmp_path):
-    assert _run(tmp_path, "marker = Path('/dev/null/warm-x')")[0] == "0 0"
+def test_a_folder_that_cannot_be_written_is_said_in_one_line(tmp_path):
+    """A second set of kernels says nothing more."""
+    other = "background.begin(Path('/dev/null/warm-y'), child, b'settings')"
+    said = _run(tmp_path, f"marker = Path('/dev/null/warm-x')\n{other}")
+    assert said[0].startswith("compiled kernels cannot be kept (")
+    assert said[0].endswith("each process compiles anew; set NUMBA_CACHE_DIR to a folder that can be written.")
+    assert said[1:] == ["0 0", "[]"]
+
+
+def test_a_cache_that_can_only_be_read_and_is_complete_says_nothing(tmp_path):
+    (tmp_path / "warm-x").touch()
+    refused = "def refuse(*_, **__): raise PermissionError(13, 'Permission denied')"
+    assert _run(tmp_path, f"{refused}\nbackground.file_lock = refuse") == ["0 0", "['warm-x']"]
 
 
 def test_a_child_that_fails_leaves_no_marker(tmp_path):

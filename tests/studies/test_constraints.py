@@ -202,3 +202,63 @@ def test_a_parameter_with_one_value_counts_in_a_constraint():
     for _ in range(6):
         a = made.ask(distributions).params["a"]
         assert 0.2 < a <= 0.6 + 1e-9
+
+
+@pytest.mark.parametrize("rule", ["modelled", "lowest"])
+def test_a_study_learns_of_failures_as_its_optimizer_does(tmp_path, rule):
+    space, settings = SearchSpace({"x": (0.0, 1.0), "y": (0.0, 1.0)}), {"seed": 2, "n_initial": 6, "failures": rule}
+    held = RobotStudy.create("rig", StudySettings(space, None, {}, settings), str(tmp_path / "journal.log"))
+    optimizer, asked = sh.Optimizer(space.box, **settings), []
+    for _ in range(10):
+        trial, own = held.ask(), optimizer.ask()
+        asked.append(list(trial.parameters.values()))
+        np.testing.assert_allclose(asked[-1], own, atol=1e-12)
+        failed = own[0] > 0.7
+        held.tell(trial.id, None if failed else float(own.sum()), failed=failed)
+        optimizer.tell(own, None if failed else float(own.sum()), failed=failed)
+    assert np.any(np.array(asked)[:6, 0] > 0.7), "no trial of the design failed: the test would show nothing"
+    other = sh.Optimizer(space.box, **settings | {"failures": "lowest" if rule == "modelled" else "modelled"})
+    other.restore(optimizer.X[:9], optimizer.y[:9])
+    assert not np.allclose(other.ask(), asked[9])
+    held.close()
+
+
+def test_a_study_in_safe_mode_starts_where_it_is_told_and_keeps_its_limits(tmp_path):
+    settings = {
+        "seed": 0,
+        "constraints": {"torque": [None, 3.0]},
+        "safety": 0.95,
+        "initial_points": [{"x": 0.1}, {"x": 0.2}, {"x": 0.3}],
+    }
+    space = SearchSpace({"x": (0.0, 1.0)})
+    held = RobotStudy.create("rig", StudySettings(space, None, {}, settings), str(tmp_path / "journal.log"))
+    tried = []
+    for _ in range(9):
+        trial = held.ask()
+        tried.append(trial.parameters["x"])
+        held.tell(trial.id, tried[-1], constraints={"torque": 1.0 + 4.0 * tried[-1] ** 2})
+    assert held.n_initial == 3
+    assert tried[:3] == pytest.approx([0.1, 0.2, 0.3])
+    assert 1.0 + 4.0 * max(tried) ** 2 <= 3.0
+    assert max(tried) > 0.5
+    held.close()
+
+
+def test_first_points_and_safety_on_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    line = (
+        "study create rig --parameters a=0:1,grip=pinch/power --noise none --constraint torque<=3 --safety 0.9 --json"
+    )
+    assert run([*line.split(), "--first", "a=0.2,grip=power", "--first", "a=0.3,grip=pinch"]) == 0
+    told = json.loads(capsys.readouterr().out)["optimizer"]
+    assert told["safety"] == 0.9
+    assert run(["study", "ask", "rig", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["parameters"] == {"a": 0.2, "grip": "power"}
+    assert run(["study", "create", "no", "--parameters", "a=0:1", "--first", "a=2"]) == 2
+    assert "initial_points" in capsys.readouterr().err
+    assert run(["study", "create", "no", "--parameters", "a=0:1", "--failures", "never"]) == 2
+    assert "choose one of: lowest, modelled" in capsys.readouterr().err
+    (tmp_path / "rig.py").write_text("def hill(x):\n    return -(x[0] - 0.6) ** 2\n")
+    line = "maximize rig.py:hill --bounds x=0:1 --method bo --noise none --trials 6 --initial 4 --out out"
+    assert run([*line.split(), "--failures", "lowest", "--first", "x=0.55"]) == 0
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["trials"]["x"][0] == [0.55]

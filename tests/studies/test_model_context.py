@@ -45,6 +45,27 @@ def test_a_loop_finds_what_holds(study):
     assert held > 0.97 * most
 
 
+def test_counts_of_successes(tmp_path):
+    settings = StudySettings(SearchSpace(RKHS.box), NOISE, {}, {"seed": 0, "outcome": "success"})
+    held = RobotStudy.create("held", settings, str(tmp_path / "journal.log"))
+
+    async def loop():
+        async with Client(model_context_server(held)) as client:
+            id = (await client.call_tool("ask", {})).structured_content["id"]
+            told = await client.call_tool("tell", {"id": id, "successes": 7, "of": 10})
+            wrong = await client.call_tool("add", {"parameters": {"x": 0.5}, "successes": 8, "of": 7})
+            await client.call_tool("add", {"parameters": {"x": 0.5}, "successes": 3, "of": 4})
+            await client.call_tool("add", {"parameters": {"x": 0.25}, "value": "success"})
+            return told, wrong, (await client.call_tool("trials", {})).structured_content["trials"]
+
+    told, wrong, trials = asyncio.run(loop())
+    assert told.structured_content == {"id": 0, "state": "complete", "value": 0.7, "already": False, "of": 10}
+    assert wrong.is_error
+    assert "successes are 8 of 7" in wrong.content[0].text
+    assert [(trial["value"], trial["of"]) for trial in trials] == [(0.7, 10), (0.75, 4), (1.0, 1)]
+    held.close()
+
+
 def test_refusals_are_errors_of_the_tool(study):
     async def refused():
         async with Client(model_context_server(study)) as client:

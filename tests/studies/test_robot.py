@@ -14,7 +14,7 @@ from optuna.trial import TrialState
 import surehold as sh
 from surehold.errors import InputError
 from surehold.optimization.noise.input_noise import noise_of_coordinates
-from surehold.studies.history import REACHED
+from surehold.studies.history import REACHED, Reader, history_of
 from surehold.studies.ledger import VETOED
 from surehold.studies.replay import result_of
 from surehold.studies.robot import NothingToAsk, RobotStudy
@@ -474,7 +474,6 @@ def test_names_and_settings_that_cannot_be(tmp_path):
 
 def test_what_was_reached_outside_the_ranges_is_learnt_from_where_it_was(tmp_path):
     """A loop of a robot that strays leaves the box now and then; nothing is refused, and nothing moved inside."""
-    from surehold.studies.history import history_of
     from surehold.studies.status import to_csv
     from surehold.studies.warm_start import import_trials, trials_of_csv
 
@@ -542,3 +541,55 @@ def test_a_direction_that_does_not_exist_and_one_that_differs(tmp_path):
     RobotStudy.create("mug", StudySettings(SearchSpace(BOX)), url)
     with pytest.raises(InputError, match="direction: maximize in the study, minimize now"):
         RobotStudy.create("mug", StudySettings(SearchSpace(BOX), direction="minimize"), url, resume=True)
+
+
+def test_what_was_read_once_is_read_again_as_if_anew(robot):
+    """Reading goes on from what is known: trials that finish late, stray, fail, and a study that takes its place."""
+    space = robot.settings.space
+    reader = Reader(space)
+
+    def same():
+        kept, anew = reader.read(robot.trials()), history_of(robot.trials(), space)
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(kept, anew, strict=True))
+        return kept
+
+    assert len(same().X) == 0
+    asked = [robot.ask() for _ in range(5)]
+    assert len(same().pending) == 5
+    robot.tell(asked[3].id, 0.5)
+    robot.tell(asked[1].id, failed=True)
+    assert same().numbers.tolist() == [1, 3]
+    name = next(iter(asked[0].parameters))
+    robot.tell(asked[0].id, 0.1, reached={name: asked[0].parameters[name] + 1e-3})
+    found = same()
+    assert found.numbers.tolist() == [0, 1, 3]
+    assert found.reached[0] != pytest.approx(found.X[0])
+    assert np.array_equal(found.reached[1:], found.X[1:])
+    robot.tell(asked[4].id, 0.7)
+    assert same().numbers.tolist() == [0, 1, 3, 4]
+    other = RobotStudy.create("other", SETTINGS, "memory")
+    asked = other.ask()
+    other.tell(asked.id, 0.3)
+    assert reader.read(other.trials()).y.tolist() == [0.3], "the trials of another study were kept"
+
+
+def test_a_fault_of_the_rig_teaches_nothing_and_the_trial_is_asked_for_again(robot):
+    asked = robot.ask("arm")
+    assert robot.tell(asked.id, failed="rig").state == "waiting"
+    again = robot.ask("another arm")
+    assert (again.id, again.parameters, again.again) == (asked.id, asked.parameters, True)
+    robot.tell(again.id, 0.5)
+    for id, arguments in ((again.id, {}), (99, {}), (robot.ask().id, {"value": 1.0})):
+        with pytest.raises(InputError):
+            robot.tell(id, failed="rig", **arguments)
+    with pytest.raises(InputError, match="'machine' is unknown"):
+        robot.tell(robot.ask().id, failed="machine")
+    assert [trial.state.name for trial in robot.trials()] == ["COMPLETE", "RUNNING", "RUNNING"]
+
+
+def test_what_is_recommended_can_be_commanded(robot):
+    """Where every trial went astray over the border, the nearest place inside is the answer."""
+    robot.tell(robot.ask().id, 0.6, reached={"dx": 0.07, "dy": 0.01})
+    assert robot.recommend().parameters == pytest.approx({"dx": 0.05, "dy": 0.01})
+    robot.tell(robot.ask().id, 0.5)
+    assert abs(robot.recommend().parameters["dx"]) <= 0.05

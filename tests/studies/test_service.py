@@ -76,6 +76,13 @@ def test_ask_and_tell(client, study):
     assert best["parameters"]["dx"] == 0.001
 
 
+def test_a_fault_of_the_rig(client):
+    asked = client.post("/ask", json={}).json()
+    told = client.post("/tell", json={"id": asked["id"], "failed": "rig"})
+    assert told.json()["state"] == "waiting"
+    assert client.post("/ask", json={}).json() == asked | {"again": True}
+
+
 def test_people_in_the_loop(client, study):
     asked = client.post("/ask", json={"worker": "arm"}).json()
     assert client.post("/ask", json={"worker": "arm"}).json() == asked | {"again": True}

@@ -1,10 +1,14 @@
-"""Making the runs of a plan: workers through joblib, one writer, and nothing lost but the runs in flight."""
+"""Making the runs of a plan: worker processes or a cluster, one writer, and nothing lost but the runs in flight."""
 
+import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from queue import SimpleQueue
+from typing import Any, Final
 
 from surehold.campaigns.methods import checked_method
 from surehold.campaigns.plan import Plan, Task
@@ -17,6 +21,11 @@ from surehold.extras import require
 __all__ = ["Progress", "checked_backend", "run_campaign"]
 
 BACKENDS = ("loky", "dask")
+REPORTS: Final = 50  # a second, of all workers: one takes the calling process, with Dask's scheduler, some milliseconds
+LARGEST_PARCEL: Final = 200  # runs
+_STALE: Final = 5.0  # seconds after which a cluster is asked again how many workers it has
+_ARRIVAL: Final = 60.0  # seconds to wait for its first one
+_THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass
@@ -31,7 +40,7 @@ class Progress:
     workers: int
     waiting: dict[tuple[str, str], int] = field(default_factory=dict)
     """runs still to be made, by problem and method"""
-    _seconds: dict[tuple[str, str], list[float]] = field(default_factory=dict)
+    _seconds: dict[tuple[str, str], tuple[int, float]] = field(default_factory=dict)
 
     def finish(self, row: dict[str, Any]) -> None:
         """Count a row."""
@@ -44,12 +53,14 @@ class Progress:
     def learn(self, row: dict[str, Any]) -> None:
         """Take in how long a run took."""
         if row["status"] == "done":
-            self._seconds.setdefault((row["problem"], row["method"]), []).append(row["seconds"])
+            key = (row["problem"], row["method"])
+            runs, seconds = self._seconds.get(key, (0, 0.0))
+            self._seconds[key] = runs + 1, seconds + row["seconds"]
 
     @property
     def remaining_seconds(self) -> float | None:
         """Estimated time to the end: each waiting run as long as those of its problem and method; None if unknown."""
-        means = {key: sum(s) / len(s) for key, s in self._seconds.items()}
+        means = {key: seconds / runs for key, (runs, seconds) in self._seconds.items()}
         if not means:
             return None
         typical = sum(means.values()) / len(means)
@@ -98,7 +109,7 @@ def run_campaign(
     """
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise InputError(f"workers is {workers!r}; give a whole number of 1 or more.")
-    kind, _ = checked_backend(backend)
+    kind, address = checked_backend(backend)
     tasks = plan.tasks(runs, shard, only)
     cells = plan.cells(only)
     for label, on in {cell.problem: cell.on for cell in cells}.items():
@@ -120,7 +131,7 @@ def run_campaign(
             progress.learn(row)
         observer(progress, None)
         local = workers == 1 and backend == "loky"
-        for row in _one_by_one(todo) if local else _spread(todo, workers, kind, backend):
+        for row in _one_by_one(todo) if local else _spread(todo, workers, kind, address):
             table.append(row)
             progress.finish(row)
             observer(progress, row)
@@ -153,41 +164,87 @@ def _one_by_one(tasks: Sequence[Task]) -> Iterator[dict[str, Any]]:
         yield run_once(*task)
 
 
-def _spread(tasks: Sequence[Task], workers: int, kind: str, backend: str) -> Iterator[dict[str, Any]]:
-    """Yield rows as workers finish them."""
-    from joblib import Parallel, delayed
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
+def _spread(tasks: Sequence[Task], workers: int, kind: str, address: str) -> Iterator[dict[str, Any]]:
+    """Yield rows as workers finish them.
 
-    settings: dict[str, Any] = {"n_jobs": workers, "batch_size": 1, "pre_dispatch": workers}
-    settings["return_as"] = "generator_unordered"
-    try:
-        with _cluster(kind, checked_backend(backend)[1], workers):
-            parallel = Parallel(**settings)
-            yield from cast(Iterator[dict[str, Any]], parallel(delayed(run_once)(*task) for task in tasks))
-    except TerminatedWorkerError:
-        raise SureholdError(
-            "a worker process died, killed by the system or out of memory; the finished runs are kept. Start again, "
-            "with fewer --workers if memory is short."
-        ) from None
+    Short runs travel together: a worker takes a parcel of them, reports after `parcel_seconds`, and sends back those
+    that it has not begun. A parcel holds twice as many as were made of the last one, so that long runs travel alone.
+    """
+    from concurrent.futures.process import BrokenProcessPool
+
+    waiting, done = deque(tasks), SimpleQueue[Future[tuple[list[dict[str, Any]], list[Task]]]]()
+    under_way, size = 0, 1
+    with _pool(kind, address, workers) as (executor, cores):
+        try:
+            while waiting or under_way:
+                while waiting and under_way < 2 * cores():  # one that is worked on, one that is ready
+                    parcel = [waiting.popleft() for _ in range(min(size, 1 + len(waiting) // (2 * cores())))]
+                    executor.submit(_made_in_time, parcel, parcel_seconds(cores())).add_done_callback(done.put)
+                    under_way += 1
+                rows, left = done.get().result()
+                under_way -= 1
+                size = min(2 * len(rows), LARGEST_PARCEL)
+                waiting.extendleft(reversed(left))
+                yield from rows
+        except Exception as error:
+            if not isinstance(error, BrokenProcessPool) and type(error).__name__ != "KilledWorker":
+                raise
+            raise SureholdError(
+                "a worker process died, killed by the system or out of memory; the finished runs are kept. Start "
+                "again, with fewer --workers if memory is short."
+            ) from None
+
+
+def parcel_seconds(workers: int) -> float:
+    """Return for how long a worker makes runs before it reports them, so that all together make `REPORTS` a second."""
+    return max(0.5, workers / REPORTS)
+
+
+def _made_in_time(tasks: list[Task], seconds: float) -> tuple[list[dict[str, Any]], list[Task]]:
+    """Make runs, one at least, until the time of a parcel is over; return their rows, and the tasks not begun."""
+    end = time.monotonic() + seconds
+    rows = [run_once(*tasks[0])]
+    while len(rows) < len(tasks) and time.monotonic() < end:
+        rows.append(run_once(*tasks[len(rows)]))
+    return rows, tasks[len(rows) :]
 
 
 @contextmanager
-def _cluster(kind: str, address: str, workers: int) -> Iterator[None]:
-    """Make joblib use the backend inside the block, with one thread of linear algebra a process."""
-    from joblib import parallel_config
+def _pool(kind: str, address: str, workers: int) -> Iterator[tuple[Executor, Callable[[], int]]]:
+    """Start worker processes, or use a cluster, inside the block; gives them, and how many there are by now."""
+    if kind == "loky":
+        from joblib.externals.loky import ProcessPoolExecutor
+
+        executor = ProcessPoolExecutor(workers, env=dict.fromkeys(_THREADS, "1"))
+        try:
+            yield executor, lambda: workers
+        finally:  # also of a generator that is left: runs in flight are lost
+            executor.shutdown(wait=True, kill_workers=True)
+        return
+    from distributed import Client, LocalCluster  # pyright: ignore[reportMissingImports]
 
     with ExitStack() as stack:
-        settings: dict[str, Any] = {}
-        if kind == "dask":
-            from distributed import Client, LocalCluster  # pyright: ignore[reportMissingImports]
+        cluster: Any = f"tcp://{address}"
+        if not address:
+            cluster = stack.enter_context(
+                LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0")
+            )
+        try:
+            client: Any = stack.enter_context(Client(cluster))
+            client.wait_for_workers(1, timeout=_ARRIVAL)
+        except OSError as error:
+            where = f"the cluster at {address}" if address else "a cluster on this machine"
+            raise SureholdError(
+                f"{where} cannot be used: {error}. Start its scheduler, and a worker at least."
+            ) from None
+        executor = client.get_executor(pure=False)
+        stack.callback(executor.shutdown, wait=False)
+        known = float("-inf"), 0
 
-            cluster: Any = f"tcp://{address}"
-            if not address:
-                cluster = stack.enter_context(
-                    LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0")
-                )
-            settings["client"] = stack.enter_context(Client(cluster))
-        else:
-            settings["inner_max_num_threads"] = 1
-        stack.enter_context(parallel_config(kind, **settings))
-        yield
+        def cores() -> int:
+            nonlocal known
+            if time.monotonic() - known[0] > _STALE:
+                known = time.monotonic(), sum(client.nthreads().values())
+            return max(known[1], 1)
+
+        yield executor, cores

@@ -51,7 +51,7 @@ def doctor(
         table.add_row("data cache", data_cache())
     for name, found in graphics_libraries().items():
         table.add_row(name, found or "not found; only needed for still pictures by MuJoCo")
-    Console(highlight=False).print(table)
+    Console(highlight=False, markup=False).print(table)
 
 
 def _warm() -> None:
@@ -60,6 +60,7 @@ def _warm() -> None:
     from surehold.extras import missing
     from surehold.optimization.compilation import compile_now
     from surehold.optimization.noise.input_noise import InputNoise
+    from surehold.optimization.success import SUCCESS_SURROGATES
     from surehold.optimization.surrogates.named import SURROGATES
 
     console = terminal()
@@ -73,6 +74,7 @@ def _warm() -> None:
         {"criterion": "ei"},
         {"risk": "cvar", "input_noise": noise},
         {"preset": "thesis", "input_noise": noise},
+        *({"outcome": "success", "surrogate": name, "input_noise": noise} for name in SUCCESS_SURROGATES),
     ]
     for number, path in enumerate(paths):
         console.print(f"Compiling {number + 1} of {len(paths)}: {', '.join(map(str, path.values()))}", markup=False)

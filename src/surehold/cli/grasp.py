@@ -199,12 +199,21 @@ def grasp(
         disturbance="the hand is off",
         success_above=0.0,
         outcomes=statuses,
-        advice="Try another --facet, more --variables (dz, rx, ry, rz or s1), another --preshape, or more --trials.",
+        advice=advice_for(problem),
         kept=kept,
         console=console,
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)
+
+
+def advice_for(problem: Any) -> str:
+    """Return what to try where no grasp succeeds: first what looks wrong with the hand, if anything does."""
+    from surehold.grasping.hand.inspection import hand_faults
+
+    faults = hand_faults(problem.simulator.hand, problem.simulator.preshape)
+    seen = f"The hand looks wrong: {' '.join(faults)} See it with surehold hand show. " if faults else ""
+    return f"{seen}Try another --facet, more --variables (dz, rx, ry, rz or s1), another --preshape, or more --trials."
 
 
 def drawn(problem: Any, outcome: Any) -> Any:

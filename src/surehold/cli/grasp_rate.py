@@ -39,6 +39,7 @@ def _grasp_rate(
     **options: Any,
 ) -> None:
     """Close the hand again in the grasps of a file, and rate them."""
+    from rich.markup import escape
     from rich.table import Table
 
     from surehold.cli.compilation import announced
@@ -78,7 +79,7 @@ def _grasp_rate(
     stored = []
     for one in rated:
         before = "" if one.stored.quality is None else f"{one.stored.quality:.3f}"
-        row = [one.stored.name, f"{one.stored.confidence:.2f}", before, one.grasp.status]
+        row = [escape(one.stored.name), f"{one.stored.confidence:.2f}", before, one.grasp.status]
         row.append(f"{one.grasp.quality:.3f}")
         if one.robust is not None:
             row += [f"{one.robust.mean:.3f}", f"{100 * one.robust.closure_rate:.0f} %"]

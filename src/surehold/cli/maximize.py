@@ -7,15 +7,19 @@ import typer
 from surehold.cli.options import (
     Allowed,
     Constraint,
+    Failures,
+    First,
     Initial,
     Method,
     Noise,
     Open,
     Out,
     Preset,
+    Safety,
     Seed,
     Study,
     StudyStorage,
+    Surrogate,
     Trials,
     checked_method,
     limits_given,
@@ -65,6 +69,7 @@ def maximize(
     initial: Initial = None,
     noise: Noise = None,
     seed: Seed = 0,
+    surrogate: Surrogate = "",
     preset: Preset = "",
     out: Out = "",
     study: Study = "",
@@ -77,6 +82,9 @@ def maximize(
     feasible: Annotated[
         float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
     ] = 0.0,
+    failures: Failures = "",
+    safety: Safety = 0.0,
+    first: First = None,
     outcome: Annotated[
         str, typer.Option(help="What a trial gives: value, or success (your function returns True or False).")
     ] = "value",
@@ -112,13 +120,19 @@ def maximize(
         preset=preset,
         folder=folder_for(chosen.name, method, seed, out, study),
         open_report=open_report,
-        settings={"problem": problem, "bounds": bounds or None, "input noise": noise_text},
+        settings={
+            "problem": problem,
+            "bounds": bounds or None,
+            "input noise": noise_text,
+            "surrogate": surrogate or None,
+        },
         direction=direction,
         outcome=outcome,
         **(_SUCCESSES if outcome == "success" else {}),
         tolerate_failures=tolerate_failures,
         kept=kept,
-        required=limits_given(constraint, allowed, feasible),
+        required=limits_given(constraint, allowed, feasible, failures, safety, first)
+        | ({"surrogate": surrogate} if surrogate else {}),
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)

@@ -11,15 +11,19 @@ __all__ = [
     "METHODS",
     "Allowed",
     "Constraint",
+    "Failures",
+    "First",
     "Initial",
     "Method",
     "Noise",
     "Open",
     "Out",
     "Preset",
+    "Safety",
     "Seed",
     "Study",
     "StudyStorage",
+    "Surrogate",
     "Trials",
     "checked_method",
     "limits_given",
@@ -28,8 +32,8 @@ __all__ = [
 ]
 
 METHODS = {
-    "ubo": "knows the input noise and looks for what holds",
-    "bo": "plain Bayesian optimization; the noise only scores its answer",
+    "ubo": "knows the input noise",
+    "bo": "is plain Bayesian optimization",
 }
 
 Method = Annotated[str, typer.Option(help="ubo: knows the input noise; bo: plain Bayesian optimization.")]
@@ -41,6 +45,14 @@ Out = Annotated[
     ),
 ]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser at the end.")]
+Surrogate = Annotated[
+    str,
+    typer.Option(
+        help="The model: two_scales (default), gp, tgp, local_global; with --outcome success: probit (default), "
+        "beta_process.",
+        show_default=False,
+    ),
+]
 Preset = Annotated[str, typer.Option(help="Settings by name, such as thesis.", show_default=False)]
 Study = Annotated[
     str,
@@ -67,6 +79,25 @@ Constraint = Annotated[
 Allowed = Annotated[
     list[str] | None,
     typer.Option(help="What may be tried, a linear constraint: 'a + 2*b <= 3'. Repeatable.", show_default=False),
+]
+Failures = Annotated[
+    str,
+    typer.Option(
+        help="What a failed trial teaches: modelled (where trials fail; default up to 200 trials) or lowest (it "
+        "counts as the lowest value).",
+        show_default=False,
+    ),
+]
+Safety = Annotated[
+    float,
+    typer.Option(
+        help="Probability with which every trial after the --first ones, which are trusted, keeps all constraints.",
+        show_default=False,
+    ),
+]
+First = Annotated[
+    list[str] | None,
+    typer.Option(help="To be tried first, NAME=VALUE,... of all variables. Repeatable.", show_default=False),
 ]
 Noise = Annotated[
     str | None,
@@ -117,7 +148,14 @@ def _number(text: str) -> float:
         ) from None
 
 
-def limits_given(constraint: list[str] | None, allowed: list[str] | None, feasible: float = 0.0) -> dict[str, Any]:
+def limits_given(
+    constraint: list[str] | None,
+    allowed: list[str] | None,
+    feasible: float = 0.0,
+    failures: str = "",
+    safety: float = 0.0,
+    first: list[str] | None = None,
+) -> dict[str, Any]:
     """Return the settings of an `Optimizer` that the options stand for, those that were not given left out.
 
     Raises InputError where a text is not understood, or an output is named twice.
@@ -134,8 +172,22 @@ def limits_given(constraint: list[str] | None, allowed: list[str] | None, feasib
     limits_of(limits)
     for text in allowed or ():
         Linear.parse(text)
-    given = {"constraints": limits, "allowed": list(allowed or ()), "feasible": feasible}
+    given: dict[str, Any] = {"constraints": limits, "allowed": list(allowed or ()), "feasible": feasible}
+    given |= {"failures": failures, "safety": safety, "initial_points": [_point(text) for text in first or ()]}
     return {name: value for name, value in given.items() if value}
+
+
+def _point(text: str) -> dict[str, float | str]:
+    """Return {name: value} of --first NAME=VALUE,...; what is no number is a choice."""
+    from surehold.studies.parameter_text import parse_assignments
+
+    found: dict[str, float | str] = {}
+    for name, value in parse_assignments(text, "--first").items():
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = value
+    return found
 
 
 def numbers_given(text: str) -> dict[str, float] | None:

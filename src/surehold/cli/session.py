@@ -17,6 +17,7 @@ from rich.table import Table
 
 from surehold.cli.compilation import announced, warm_up
 from surehold.cli.interruption import terminable, undisturbed
+from surehold.cli.options import METHODS
 from surehold.cli.terminal import terminal
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.maximization import Result, Trial, maximize
@@ -98,7 +99,7 @@ def run_session(
 
     A run that is kept as a study is resumed where that exists.
 
-    `required` are the settings of an `Optimizer` for constraints: allowed, constraints, feasible.
+    `required` are further settings of an `Optimizer`: surrogate, and those of constraints and failures.
 
     `describe` adds to a candidate what the problem knows of it; `also_write` writes further files. Where no trial is
     worth more than `success_above`, the report says so first, with the counts of `outcomes` and `advice`; what the
@@ -138,7 +139,8 @@ def run_session(
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
         console.print(
-            f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), method {method}, seed {seed}"
+            f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), seed {seed}; "
+            f"method {method} {METHODS[method]}"
         )
         with announced(console):
             warm_up(problem, options, console)
@@ -312,9 +314,7 @@ def _show(report: RunReport, path: Path, seconds: float, console: Console) -> No
     table = Table(title=None, show_edge=False, pad_edge=False, header_style="bold")
     table.add_column("")
     for candidate in report.candidates:
-        alone = len(report.candidates) == 1
-        same = alone and not report.counted
-        table.add_column(f"{report.extreme} observed = recommended" if same else candidate.label, overflow="fold")
+        table.add_column(report.called(candidate), overflow="fold")
     for name, cells in page.table_rows(report):
         table.add_row(_plain(name), *(_plain(cell) for cell in cells))
     told = verdict(report)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from surehold.cli import study_people, study_service
-from surehold.cli.options import Allowed, Constraint
+from surehold.cli.options import Allowed, Constraint, Failures, First, Safety, Surrogate
 from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, quiet, say, write_out
 
 __all__ = ["studies"]
@@ -61,7 +61,7 @@ def create(
     ] = "",
     seed: Annotated[int, typer.Option(help="Same seed, same suggestions.")] = 0,
     initial: Annotated[int | None, typer.Option(help="Trials of the initial design.")] = None,
-    surrogate: Annotated[str, typer.Option(help="two_scales (default), gp or tgp (default from 400 trials on).")] = "",
+    surrogate: Surrogate = "",
     criterion: Annotated[str, typer.Option(help="As in surehold.Optimizer.", show_default=False)] = "",
     risk: Annotated[str, typer.Option(help="mean, mean-std, var, cvar or worst.")] = "mean",
     observation_noise: Annotated[
@@ -74,6 +74,9 @@ def create(
     feasible: Annotated[
         float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
     ] = 0.0,
+    failures: Failures = "",
+    safety: Safety = 0.0,
+    first: First = None,
     outcome: Annotated[
         str, typer.Option(help="Of a trial: value, or success (tell success, failure or 7/10).")
     ] = "value",
@@ -93,7 +96,7 @@ def create(
     optimizer |= {} if risk == "mean" else {"risk": risk}
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
     optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
-    optimizer |= limits_given(constraint, allowed, feasible)
+    optimizer |= limits_given(constraint, allowed, feasible, failures, safety, first)
     input_noise = None if noise.strip().lower() == "none" else noise_of(noise, "bo")
     if space.box is None or space.box.numbers is None:
         input_noise = None  # choices carry none
@@ -141,6 +144,9 @@ def tell(
         typer.Argument(help="Outcome: a number; or success, failure, or 7/10.", show_default=False),
     ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="The trial gave nothing.")] = False,
+    rig: Annotated[
+        bool, typer.Option("--rig", help="The rig failed, not the place: nothing is learnt, it is asked for again.")
+    ] = False,
     reached: Annotated[
         str, typer.Option(help="What was truly reached, where it differs: NAME=VALUE,...", show_default=False)
     ] = "",
@@ -168,8 +174,8 @@ def tell(
 
         touched = contact_rows(contacts)
     study = opened(name, storage)
-    told = study.tell(id, value, failed=failed, reached=places, constraints=outputs, contacts=touched)
-    outcome = "failed" if told.value is None else f"value {told.value!r}"
+    told = study.tell(id, value, failed="rig" if rig else failed, reached=places, constraints=outputs, contacts=touched)
+    outcome = told.state if told.value is None else f"value {told.value!r}"
     outcome += f" of {told.of} executions" * (told.of > 1)
     found = {"id": told.id, "state": told.state, "value": told.value, "already": told.already, "of": told.of}
     say(found, f"trial {told.id}: {outcome}{', as told before' * told.already}", as_json)
@@ -177,6 +183,8 @@ def tell(
 
 def recommend(name: Name, storage: Storage = "", as_json: Json = False) -> None:
     """Recommend the trial that still holds when the input is off, and note it in the study."""
+    from surehold.optimization.recommendation import outliers_in_words
+
     study = opened(name, storage)
     best = study.recommend()
     lines = [f"trial {best.trial}: expect {best.mean:.4g} ± {best.std:.2g}, 95 % better than {best.quantile:.4g}"]
@@ -184,7 +192,7 @@ def recommend(name: Name, storage: Storage = "", as_json: Json = False) -> None:
     lines += [f"  {key} = {value} {units.get(key, '')}".rstrip() for key, value in best.parameters.items()]
     lines += [f"  expected {key} {value:.4g}" for key, value in best.outputs.items()]
     lines += [f"{best.feasible:.1%} of executions keep all constraints"] if study.sampler.outputs else []
-    lines += [text for text in (best.infeasible, best.refused, best.warning) if text]
+    lines += [text for text in (best.infeasible, best.refused, outliers_in_words(best.outliers), best.warning) if text]
     say(best.as_dict() | {"units": dict(units)}, "\n".join(lines), as_json)
 
 

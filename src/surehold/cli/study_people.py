@@ -100,7 +100,7 @@ def stop(
     study.set_stop_rule(StopRule(trials, until, improvement, asks))
     reason = study.stopped()
     found = {"name": name, "stop_rule": study.stop_rule.as_dict(), "stopped": bool(reason), "reason": reason}
-    say(found, f"study {name}: {'stopped, ' + reason if reason else 'open'}", as_json)
+    say(found, f"study {name}: {'stopped, ' + reason if reason else f'open, {study.stop_rule}'}", as_json)
 
 
 def import_trials(

@@ -4,8 +4,10 @@ A trial depends on its pose and posture alone, therefore the result is the same,
 workers. What comes back are numbers; `Simulator.grasp` gives the contacts of a trial that deserves a second look.
 """
 
+import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +19,8 @@ from surehold.grasping.simulator import Simulator
 
 __all__ = ["GraspBatch", "grasp_batch"]
 
-_CHUNK = 100  # trials that a worker takes at a time: a fifth of a second
+_CHUNK = 100  # trials that a worker takes at a time, at most: a fifth of a second
+_IDLE = 300  # seconds after which workers that have nothing to do end
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,16 +66,19 @@ def grasp_batch(simulator: Simulator, poses: Sequence[Pose], s1: ArrayLike = 0.0
     if postures.shape[:1] not in ((), (len(poses),)) or postures.ndim > 2:
         raise InputError(f"s1 has shape {postures.shape}; give one number or one for each of the {len(poses)} poses.")
     postures = postures if postures.ndim else np.broadcast_to(postures, len(poses))
-    parts = [slice(start, start + _CHUNK) for start in range(0, len(poses), _CHUNK)]
+    chunk = max(1, min(_CHUNK, len(poses) // (4 * workers)))
+    parts = [slice(start, start + chunk) for start in range(0, len(poses), chunk)]
     if workers == 1 or len(parts) < 2:
         rows = [_outcomes(simulator, poses[part], postures[part]) for part in parts]
     else:
-        from joblib import Parallel, delayed
+        from joblib.externals.loky import get_reusable_executor
 
         simulator.warm_up()  # compiled once, read from the cache by the workers
-        # Arrays are copied, not mapped: read-only ones would be compiled for anew.
-        pool = Parallel(n_jobs=int(workers), max_nbytes=None, inner_max_num_threads=1, backend="loky")
-        rows = pool(delayed(_outcomes)(simulator, poses[part], postures[part].copy()) for part in parts)
+        content = pickle.dumps(simulator)
+        pool = get_reusable_executor(int(workers), timeout=_IDLE, env={"OPENBLAS_NUM_THREADS": "1"})
+        rows = list(
+            pool.map(partial(_outcomes_there, content), [(poses[part], postures[part].copy()) for part in parts])
+        )
     table = np.concatenate([np.empty((0, 5)), *rows])  # type: ignore[list-item]
     quality, status, penetration, contacts, fallbacks = table.T
     return GraspBatch(
@@ -82,6 +88,16 @@ def grasp_batch(simulator: Simulator, poses: Sequence[Pose], s1: ArrayLike = 0.0
         contacts.astype(np.int64),
         fallbacks.astype(np.int64),
     )
+
+
+@lru_cache(maxsize=2)
+def _simulator(content: bytes) -> Simulator:
+    """Return the simulator in a worker process: to make it takes as long as dozens of trials."""
+    return pickle.loads(content)
+
+
+def _outcomes_there(content: bytes, part: tuple[Sequence[Pose], NDArray[np.float64]]) -> NDArray[np.float64]:
+    return _outcomes(_simulator(content), *part)
 
 
 def _outcomes(simulator: Simulator, poses: Sequence[Pose], postures: NDArray[np.float64]) -> NDArray[np.float64]:

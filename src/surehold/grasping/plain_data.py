@@ -53,8 +53,8 @@ def grasp_to_dict(value: object) -> Any:
     """Return a grasp, or anything made of dataclasses, named tuples, arrays, mappings and numbers, as plain JSON data.
 
     Arrays become nested lists, numbers that are not finite become None (JSON has no NaN). Dataclass fields whose
-    metadata say `derived` are left out: they follow from the others. Raises InputError for a value that has no plain
-    form.
+    metadata say `derived` are left out: they follow from the others; properties that the class names in `told_too` are
+    taken in. Raises InputError for a value that has no plain form.
     """
     if value is None or isinstance(value, (str, bool)):
         return value
@@ -67,7 +67,8 @@ def grasp_to_dict(value: object) -> Any:
     if isinstance(value, np.ndarray):
         return grasp_to_dict(value.tolist())
     if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: grasp_to_dict(getattr(value, f.name)) for f in fields(value) if not f.metadata.get("derived")}
+        names = [f.name for f in fields(value) if not f.metadata.get("derived")]
+        return {name: grasp_to_dict(getattr(value, name)) for name in (*names, *getattr(value, "told_too", ()))}
     if isinstance(value, tuple) and hasattr(value, "_asdict"):
         return {k: grasp_to_dict(v) for k, v in value._asdict().items()}  # type: ignore[attr-defined]
     if isinstance(value, Mapping):

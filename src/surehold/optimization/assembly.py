@@ -30,10 +30,11 @@ from surehold.optimization.strategy.named import strategy_named
 from surehold.optimization.strategy.protocol import Strategy
 from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.strategy.trust_region import TrustRegion
-from surehold.optimization.success import BETA_PROCESS, check_combination, success_surrogate
+from surehold.optimization.success import SUCCESS_SURROGATES, check_combination, success_surrogate
 from surehold.optimization.surrogates.named import TELLABLE
 from surehold.optimization.surrogates.protocol import NoisySurrogate
 from surehold.optimization.surrogates.success.beta_process import BetaProcess
+from surehold.optimization.surrogates.success.preference import PreferenceProcess
 from surehold.optimization.trial_inputs import initial_inputs
 
 __all__ = ["Parts", "assembled", "default_n_initial", "whole_number"]
@@ -67,10 +68,12 @@ def default_n_initial(box: Box, variables: int | None = None) -> int:
     return max(DESIGN_LEAST, min(DESIGN_PER_VARIABLE * d, DESIGN_MOST + d // DESIGN_VARIABLES_PER_MORE))
 
 
-def whole_number(name: str, value: int, least: int) -> int:
-    """Return the argument `name` as an int; raises InputError where it is none of `least` or more."""
+def whole_number(name: str, value: int, least: int, most: float = np.inf) -> int:
+    """Return the argument `name` as an int; raises InputError where it is none from `least` to `most`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         raise InputError(f"{name} is {value!r}; give a whole number of {least} or more.")
+    if value > most:
+        raise InputError(f"{name} is {value}; give {most:,} at most.")
     return int(value)
 
 
@@ -84,10 +87,10 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     check_kinds(settings)
     s = SimpleNamespace(**settings)
     _check(s)
-    if s.outcome == "success":
+    if s.outcome != "value":
         check_combination(settings)
-    elif isinstance(s.surrogate, str) and s.surrogate == BETA_PROCESS:
-        raise InputError(f"surrogate='{BETA_PROCESS}' counts successes; say outcome='success' beside it.")
+    elif isinstance(s.surrogate, str) and s.surrogate in SUCCESS_SURROGATES:
+        raise InputError(f"surrogate='{s.surrogate}' is of successes; say outcome='success' beside it.")
     seed = whole_number("seed", s.seed, 0)
     input_noise = noise_of_coordinates(s.input_noise, box)
     straying = input_noise if s.noise_while_exploring else None
@@ -97,8 +100,9 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     n_initial = len(first) if s.safety is not None else max(wanted, len(first))
     told = s.noise == "told"
     thesis = None if s.preset is None else thesis_preset(s.preset)
+    own = {"success": lambda: success_surrogate(s.surrogate), "preference": PreferenceProcess}
     surrogate = chosen_surrogate(
-        success_surrogate(s.surrogate) if s.outcome == "success" else s.surrogate,
+        own.get(s.outcome, lambda: s.surrogate)(),
         preset=s.preset,
         thesis=thesis,
         noise=None if told else s.noise,
@@ -184,7 +188,7 @@ def _turned(output_range: tuple[float, float] | None) -> tuple[float, float] | N
 def _check(s: SimpleNamespace) -> None:
     for name, known in (
         ("direction", ("maximize", "minimize")),
-        ("outcome", ("value", "success")),
+        ("outcome", ("value", "success", "preference")),
         ("conditions", ("commanded", "measured")),
         ("failures", (None, "lowest", "modelled")),
     ):
@@ -202,7 +206,7 @@ def _check(s: SimpleNamespace) -> None:
 def _failures_modelled(s: SimpleNamespace) -> float:
     """Return up to how many trials it is modelled which of them fail."""
     if s.failures is None:
-        return 0 if s.preset is not None or s.outcome == "success" else FAILURES_MODELLED
+        return 0 if s.preset is not None or s.outcome != "value" else FAILURES_MODELLED
     return np.inf if s.failures == "modelled" else 0
 
 

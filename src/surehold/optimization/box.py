@@ -13,6 +13,8 @@ from surehold.optimization.variables import Choice, Number, Variable, variable_o
 
 __all__ = ["Box"]
 
+_MOST: Final = 10_000  # variables: more than a model can be made of, and a default design still fits into memory
+
 
 class Box:
     """Named variables; their order is the order of the coordinates.
@@ -64,6 +66,8 @@ class Box:
             raise InputError(
                 f"bounds are {bounds!r}; give a mapping such as {{'dx': (-0.05, 0.05)}} of one or more names."
             )
+        if len(bounds) > _MOST:
+            raise InputError(f"the box has more than {_MOST:,} variables; give those that matter most.")
         self.variables: Final[tuple[Variable, ...]] = tuple(variable_of(name, given) for name, given in bounds.items())
         self.plain: Final = all(isinstance(v, Number) and not (v.step or v.log) for v in self.variables)
         names: list[str] = []
@@ -84,7 +88,7 @@ class Box:
     @classmethod
     def unit(cls, dimension: int) -> "Box":
         """Return the unit cube with variables `x1` ... `xd`."""
-        return cls({f"x{i + 1}": (0.0, 1.0) for i in range(dimension)})
+        return cls({f"x{i + 1}": (0.0, 1.0) for i in range(min(dimension, _MOST + 1))})
 
     @property
     def dimension(self) -> int:
@@ -158,15 +162,16 @@ class Box:
         """
         X = np.zeros((len(rows), self.dimension))
         names = [variable.name for variable in self.variables]
-        for x, row in zip(X, rows, strict=True):
+        for row in rows:
             if len(row) != len(names) or any(name not in row for name in names):
                 raise InputError(f"point {dict(row)!r} does not fit; name exactly {', '.join(names)}.")
-            for variable in self.variables:
-                own, value = self._columns[variable.name], row[variable.name]
-                if isinstance(variable, Number):
-                    x[own] = variable.to_coordinate(np.array([variable.anywhere(value, "point")], dtype=np.float64))
-                else:
-                    x[own.start + variable.place(value)] = 1.0
+        for variable in self.variables:
+            own, values = self._columns[variable.name], [row[variable.name] for row in rows]
+            if isinstance(variable, Number):
+                numbers = np.array([variable.anywhere(value, "point") for value in values], dtype=np.float64)
+                X[:, own] = variable.to_coordinate(numbers)[:, None]
+            else:
+                X[np.arange(len(rows)), [own.start + variable.place(value) for value in values]] = 1.0
         return X
 
     def points(self, x: Any) -> NDArray[np.float64]:

@@ -87,8 +87,14 @@ def _short_run(told: Mapping[str, Any]) -> None:
     }
     settings = {**told, "input_noise": kinds[told["input_noise"]]}
     optimizer = Optimizer(Box.unit(2), n_initial=_DESIGN, **settings)
+    best = None
     for _ in range(_TRIALS):
         x = optimizer.ask()
+        if optimizer.outcome == "preference":
+            if best is not None:
+                optimizer.tell_preference(x, best)
+            best = x
+            continue
         value = float(1.0 - (x[0] - 0.3) ** 2 - abs(x[1] - 0.6))
         if optimizer.outcome == "success":
             optimizer.tell(x, success=value > 0.6)

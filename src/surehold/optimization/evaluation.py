@@ -12,6 +12,7 @@ from surehold.errors import InputError, SureholdError
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.points import numbers_of
 from surehold.optimization.trials import AskedTrial
+from surehold.optimization.values import LARGEST
 
 __all__ = ["Evaluation", "evaluate", "in_processes", "one_by_one"]
 
@@ -62,9 +63,8 @@ def _number(value: Any) -> tuple[float, str]:
         return np.nan, f"{type(error).__name__}: {error}"
     if array.size != 1:
         return np.nan, f"returned an array of shape {array.shape} instead of one number"
-    if not np.isfinite(array).all():
-        return np.nan, f"returned {float(array.reshape(()))}"
-    return float(array.reshape(())), ""
+    number = float(array.reshape(()))
+    return (number, "") if abs(number) <= LARGEST else (np.nan, f"returned {number}")
 
 
 def argument(optimizer: Optimizer, asked: AskedTrial) -> NDArray[np.float64] | dict[str, Any]:

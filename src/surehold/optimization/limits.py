@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
+from surehold.optimization.values import LARGEST_SQUARED
 
 __all__ = ["Limit", "checked_outputs", "limits_of", "parsed_limit", "returned_outputs"]
 
@@ -117,8 +118,10 @@ def checked_outputs(
             number = np.nan if value is None else _number(value)
         except (TypeError, ValueError, OverflowError):
             number = np.inf
-        if value is not None and not np.isfinite(number):
-            raise InputError(f"output '{limit.name}' is {value!r}; give one finite number, or None.")
+        if value is not None and not abs(number) <= LARGEST_SQUARED:
+            raise InputError(
+                f"output '{limit.name}' is {repr(value)[:60]}; give one number up to {LARGEST_SQUARED:g}, or None."
+            )
         found.append(number)
     return tuple(found)
 

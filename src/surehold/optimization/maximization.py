@@ -285,6 +285,8 @@ def _count(name: str, value: int) -> int:
 
 
 def _optimizer(box: Box, n_trials: int, settings: dict[str, Any]) -> Optimizer:
+    if settings.get("outcome") == "preference":
+        raise InputError("a function gives no preferences; make an Optimizer, and tell_preference(better, worse).")
     optimizer = Optimizer(box, **settings)
     if settings.get("n_initial") is None and optimizer.n_initial > n_trials:
         fewer: dict[str, Any] = {**settings, "n_initial": n_trials}

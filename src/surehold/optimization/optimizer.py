@@ -19,6 +19,7 @@ from surehold.optimization.assembly import assembled, default_n_initial, whole_n
 from surehold.optimization.box import Box
 from surehold.optimization.compilation import compile_ahead
 from surehold.optimization.diagnosis import Diagnosis
+from surehold.optimization.lattice import LatticePosterior
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
@@ -30,12 +31,15 @@ from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.success import described
 from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.surrogates.protocol import Posterior, Surrogate, mixture
+from surehold.optimization.surrogates.success.preference import PreferencePosterior
 from surehold.optimization.trials import AskedTrial, Trials
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["Optimizer"]
+
+_MOST_AT_ONCE = 100_000  # trials asked for in one call; more is a slip of the pen
 
 
 class Optimizer(Record):
@@ -146,7 +150,10 @@ class Optimizer(Record):
         several times, `tell(x, successes=7, of=10)`. What is maximized is then the probability to succeed, under the
         input noise; `y` and `predict` are shares and probabilities, and `Recommendation.probability_of_share` answers
         how sure it is that nine of ten executions succeed. Model and criterion are its own (Tesch et al. 2013);
-        `surrogate="beta_process"` counts near by instead, for many trials (Montesano and Lopes 2012).
+        `surrogate` is then "probit" (default) or "beta_process", which counts near by (Montesano and Lopes 2012).
+        "preference": two trials are compared, `tell_preference(better, worse)` (Chu and Ghahramani 2005). What is
+        maximized is a utility, in units of the error with which it is judged; `y` is the share of its comparisons
+        that an input won, and `preferred(x, other)` says how probably x would win.
 
     Raises
     ------
@@ -268,7 +275,9 @@ class Optimizer(Record):
         return self._ask_one(number) if n is None else self._ask(n, number)
 
     def _ask(self, n: int, number: int | None) -> list[AskedTrial]:
-        return [self._ask_one(None if number is None else number + i) for i in range(whole_number("n", n, 1))]
+        return [
+            self._ask_one(None if number is None else number + i) for i in range(whole_number("n", n, 1, _MOST_AT_ONCE))
+        ]
 
     def _ask_one(self, number: int | None) -> AskedTrial:
         position = self._trials.next_number if number is None else whole_number("number", number, 0)
@@ -346,6 +355,17 @@ class Optimizer(Record):
         with single_threaded():
             mean, variance = mixture(perturbations.outcome(self.posterior, U))
         return self._sign * mean, np.sqrt(variance)
+
+    def preferred(self, x: Any, other: Any) -> float:
+        """Return the probability that one judgement prefers x to `other`, both (d,) in the box's units.
+
+        Raises InputError where `outcome` is not "preference", or nothing was told yet.
+        """
+        posterior = self.posterior
+        posterior = posterior.unrounded if isinstance(posterior, LatticePosterior) else posterior
+        if not isinstance(posterior, PreferencePosterior):
+            raise InputError("only an Optimizer(..., outcome='preference') knows which input would be preferred.")
+        return posterior.preferred(*(self._snapped(self.box.to_unit(u)) for u in (x, other)))
 
     def diagnosis(self) -> Diagnosis | None:
         """Return how well the model predicts each trial from the others; None where it cannot tell.

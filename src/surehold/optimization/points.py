@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError
 
-__all__ = ["named_rows", "numbers_of", "points_of"]
+__all__ = ["column_of", "named_rows", "numbers_of", "points_of"]
 
 _KINDS = {"M": "a date", "m": "a duration", "c": "complex"}
 
@@ -23,7 +23,7 @@ def points_of(x: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
     ----------
     x
         Numbers (..., d) in the order of the names; or a dictionary, a Series of pandas, a structured array: a number
-        (or numbers of one shape) for each name; or a DataFrame with a column for each name.
+        (or numbers of one shape) for each name; a list of these; or a DataFrame with a column for each name.
     names
         Of the d variables.
 
@@ -34,6 +34,8 @@ def points_of(x: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
     """
     if type(x) is np.ndarray and x.dtype == np.float64:
         points = x
+    elif (rows := _listed(x)) is not None:
+        points = np.stack([_stacked(row, names) for row in rows])
     elif (named := _by_name(x)) is not None:
         points = _stacked(named, names)
     else:
@@ -65,10 +67,18 @@ def numbers_of(value: Any) -> NDArray[np.float64]:
     return array.astype(np.float64)
 
 
+def column_of(name: str, values: Any) -> NDArray[np.float64]:
+    """Return values as an array; raises InputError, which begins with the name, where some of them are no numbers."""
+    try:
+        return numbers_of(values)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} {_why(error)}; give numbers, one a trial.") from None
+
+
 def named_rows(x: Any) -> tuple[list[dict[Any, Any]], bool] | None:
     """Return the dictionaries that x is made of, and whether it is a table of them; None of what carries no names."""
-    if isinstance(x, (list, tuple)) and x and all(isinstance(row, Mapping) for row in x):
-        return [dict(row) for row in x], True
+    if (rows := _listed(x)) is not None:
+        return rows, True
     named = _by_name(x)
     if named is None:
         return None
@@ -76,6 +86,12 @@ def named_rows(x: Any) -> tuple[list[dict[Any, Any]], bool] | None:
         columns = {name: list(values) for name, values in named.items()}
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)], True
     return [named], False
+
+
+def _listed(x: Any) -> list[dict[Any, Any]] | None:
+    """Return the dictionaries of a list of points that carry names; None of what is none."""
+    rows = [_by_name(row) for row in x] if isinstance(x, (list, tuple)) else []
+    return [row or {} for row in rows] if any(row is not None for row in rows) else None
 
 
 def _by_name(x: Any) -> dict[Any, Any] | None:

@@ -19,6 +19,7 @@ from surehold.optimization.limits import Limit
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.points import column_of
 from surehold.optimization.success import counted
 from surehold.optimization.trials import AskedTrial, Trials
 from surehold.optimization.values import number_of, told_noise
@@ -47,7 +48,7 @@ class Record(ABC):
         self._sign: Final = 1.0 if self.direction == "maximize" else -1.0
         self._noise_told: Final = settings["noise"] == "told"
         self._conditions_measured: Final = box.uncontrolled is not None and settings["conditions"] == "measured"
-        self._trials = Trials(box, limits, self.outcome == "success")
+        self._trials = Trials(box, limits, self.outcome != "value")
 
     @abstractmethod
     def _replaced(self) -> None:
@@ -138,6 +139,19 @@ class Record(ABC):
         deviation = told_noise(noise, wanted=self._noise_told and not failed)
         self._trials.tell(x, y, failed, reached, constraints, executions, deviation)
 
+    def tell_preference(self, better: Any, worse: Any) -> None:
+        """Record that one input was judged better than another, where `outcome` is "preference".
+
+        Both are what `tell` takes as x: asked for, told before, or new. Of two that are equally good tell nothing, or
+        both orders. A new input is told by its first comparison; compare it with the best so far, `recommend().x`.
+
+        Raises InputError where an input is bad, or both are one; or where `outcome` is another.
+        """
+        if self.outcome != "preference":
+            raise InputError("this optimizer is told no preferences; make Optimizer(..., outcome='preference').")
+        self._trials.compare(better, worse)
+        self._replaced()
+
     def _with_conditions(self, x: Any, reached: Any) -> Any:
         """Return the reached input, of which only the uncontrolled variables must be said."""
         held = self.box.uncontrolled
@@ -168,24 +182,26 @@ class Record(ABC):
         outputs: ArrayLike | None = None,
         of: ArrayLike | None = None,
         noise: ArrayLike | None = None,
+        preferences: ArrayLike = (),
     ) -> None:
         """Replace all trials by stored ones: X (t, d) with values y (t,), NaN for failed ones, and pending (p, d).
 
         `reached` (t, d) are the inputs that were truly reached, X where None. `numbers` (t + p,) are those of the
         trials, the pending ones last; 0, 1, 2, ... where None. `outputs` (t, o) are the further outputs in the order of
         `constraints`, NaN where not measured. `of` (t,) are the executions of which y is the share of successes, 1 each
-        where None. `noise` (t,) are the standard deviations told. What is asked next is what an optimizer asks that was
-        told these trials in this order.
+        where None. `noise` (t,) are the standard deviations told. `preferences` (p, 2) are rows of X that
+        were compared, the better one first; y is counted from them then. What is asked next is what an optimizer asks
+        that was told these trials in this order.
 
         Raises
         ------
         InputError
             If shapes do not fit, an input is not finite, X or pending lie outside the box, or a value is infinite.
         """
-        values = self._sign * np.asarray(y, dtype=np.float64)
+        values = self._sign * column_of("y", y)
         if self.outcome == "success":
             values = np.where(np.isnan(values), 0.0, values)  # a failed trial did not succeed
-        trials = Trials(self.box, self._trials.limits, self.outcome == "success")
+        trials = Trials(self.box, self._trials.limits, self.outcome != "value")
         trials.restore(
             X,
             values,
@@ -195,6 +211,7 @@ class Record(ABC):
             outputs,
             of,
             noise,
+            preferences,
         )
         if not trials.equal(self._trials):
             self._replaced()

@@ -29,11 +29,10 @@ from surehold.optimization.maximizer.multistart import multistart
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
+from surehold.optimization.output_models import OutputModels
 from surehold.optimization.recommendation import Recommendation, execution_at
-from surehold.optimization.response_model import ResponseModel
 from surehold.optimization.strategy.ranking import History, Ranking
-from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, NoiseName
-from surehold.optimization.surrogates.protocol import Posterior
+from surehold.optimization.surrogates.gaussian_process.model import NoiseName
 from surehold.optimization.trials import Trials, same
 
 __all__ = ["Requirements"]
@@ -83,20 +82,15 @@ class Requirements:
         self._box: Final = box
         self._ranking: Final = ranking
         self._straying: Final = straying
-        self._noise: Final[NoiseName] = noise
-        self._lattice: Final = lattice
-        self._seed: Final = seed
-        self._limited: Final = tuple(k for k, limit in enumerate(limits) if not limit.watched)
         self._success: tuple[int, SuccessModel] | None = None
         self._allowed: list[bool] = []
-        self._cautious: Final[dict[int, tuple[int, Posterior]]] = {}
-        self._models: Final = {k: self._model(GaussianProcess(noise=noise), k) for k in range(len(limits))}
+        self._outputs: Final = OutputModels(
+            box, limits, cautious=safety is not None, straying=straying, noise=noise, lattice=lattice, seed=seed
+        )
 
     def forget(self) -> None:
         """Drop what was learnt: the trials are others from now on."""
-        for model in self._models.values():
-            model.forget()
-        self._cautious.clear()
+        self._outputs.forget()
         self._success = None
         self._allowed = []
 
@@ -104,22 +98,22 @@ class Requirements:
 
     def probability(self, trials: Trials, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the probability (q,) that one execution at U (q, d) keeps all limits."""
-        return execution_probability(self._outputs(trials), self._ranking.accurate, U)
+        return execution_probability(self._outputs.required(trials), self._ranking.accurate, U)
 
     def feasibility(self, trials: Trials) -> NDArray[np.float64]:
         """Return the probability (t,) that one execution where each trial was keeps all limits; 0 if not allowed.
 
         Where inputs and observations are exact, what was told decides.
         """
-        places, told = trials.places, trials.outputs[:, list(self._limited)]
+        places, told = trials.places, self._outputs.told(trials)
         found = np.ones(len(trials))
         known = np.isfinite(told).all(axis=1) & (self._ranking.exact_inputs and not self._ranking.noisy)
         if known.any():
-            found[known] = self._missed(told[known]).max(axis=1, initial=-np.inf) <= 0.0
-        if not known.all() and self._limited:
+            found[known] = self._outputs.missed(trials)[known].max(axis=1, initial=-np.inf) <= 0.0
+        if not known.all() and self._outputs.limited:
             found[~known] = self.probability(trials, places[~known])
         found[~self._allowed_at(trials)] = 0.0
-        if self.safety is not None and self._unmeasured(trials):
+        if self.safety is not None and self._outputs.unmeasured(trials):
             found[:] = 0.0
         return found
 
@@ -131,11 +125,6 @@ class Requirements:
         if len(new):
             self._allowed += self.region.contains(new).tolist()
         return np.array(self._allowed, dtype=bool)
-
-    def _unmeasured(self, trials: Trials) -> list[str]:
-        """Return the names of limited outputs that no trial has measured."""
-        measured = self._measured(trials)
-        return [self.limits[k].name for k in self._limited if k not in measured]
 
     def feasible(self, trials: Trials) -> NDArray[np.bool_]:
         """Tell which trials may become the answer, (t,)."""
@@ -161,21 +150,20 @@ class Requirements:
 
     def shortfall(self, trials: Trials) -> str:
         """Return in words that nothing feasible is known, and what came nearest; empty where something is."""
-        if unmeasured := self._unmeasured(trials):
+        if unmeasured := self._outputs.unmeasured(trials):
             names = " and ".join(unmeasured)
             return f"none of {len(trials)} trials has measured {names}: whether limits are kept there is not known."
         if self.feasible(trials).any():
             return ""
-        told = trials.outputs[:, list(self._limited)]
-        missed = self._missed(told)
-        measured = trials.successful & np.isfinite(missed).all(axis=1) & (len(self._limited) > 0)
+        limited, missed = self._outputs.limited, self._outputs.missed(trials)
+        measured = trials.successful & np.isfinite(missed).all(axis=1) & (len(limited) > 0)
         start = f"no feasible trial in {len(trials)}"
         if not measured.any():
             return f"{start}."
-        nearest = int(np.argmin(np.where(measured, self._beyond(trials), np.inf)))
+        nearest = int(np.argmin(np.where(measured, self._outputs.beyond(trials), np.inf)))
         parts = [
-            f"missed {self.limits[k].name} by {amount:.3g}"
-            for k, amount in zip(self._limited, missed[nearest], strict=True)
+            f"missed {limit.name} by {amount:.3g}"
+            for limit, amount in zip(limited, missed[nearest], strict=True)
             if amount > 0.0
         ]
         if parts:
@@ -193,7 +181,7 @@ class Requirements:
             raise InputError("no trial at an allowed input has given a value yet; ask for one, and tell its outcome.")
         best = share >= share.max() - 1e-12
         if best.sum() > 1:  # all certainly infeasible: the one that misses least
-            beyond = self._beyond(trials)
+            beyond = self._outputs.beyond(trials)
             best = np.arange(len(best)) == int(np.argmin(np.where(best & np.isfinite(beyond), beyond, np.inf)))
         none = np.empty((0, self._box.dimension))
         return History(trials.places[best], trials.modelled[best], none, none)
@@ -204,14 +192,14 @@ class Requirements:
         """Return the answer at u (d,) with what is known of its outputs and of its feasibility."""
         if self.region is None and not self.limits and not self.model_failures(trials):
             return answer
-        posteriors = self.posteriors(trials)
+        posteriors = self._outputs.all(trials)
         outputs = {name: execution_at(posterior, reached, u) for name, posterior in posteriors.items()}
         tried = np.flatnonzero(trials.eligible & same(u, trials.places)) if self._ranking.exact_inputs else []
         if len(tried):  # what was told there says more than the model, where observations are exact
             share = float(self.feasibility(trials)[tried].max())
         else:
-            share = float(execution_probability(self._outputs(trials), reached, u[None, :])[0])
-        if self._unmeasured(trials):  # nothing is known: no promise is made
+            share = float(execution_probability(self._outputs.required(trials), reached, u[None, :])[0])
+        if self._outputs.unmeasured(trials):  # nothing is known: no promise is made
             share = 0.0
         highest = int(np.nanargmax(trials.values))
         refused = answer.refused
@@ -222,8 +210,8 @@ class Requirements:
     def _why_refused(self, trials: Trials, k: int, sign: float) -> str:
         what = "highest" if sign > 0.0 else "lowest"
         start = f"The {what} observed trial gave {sign * trials.values[k]:.4g}, but "
-        missed = self._missed(trials.outputs[k : k + 1, list(self._limited)])[0]
-        parts = [f"{self.limits[i].name} by {m:.3g}" for i, m in zip(self._limited, missed, strict=True) if m > 0.0]
+        missed = zip(self._outputs.limited, self._outputs.missed(trials)[k], strict=True)
+        parts = [f"{limit.name} by {m:.3g}" for limit, m in missed if m > 0.0]
         if parts:
             return f"{start}missed {' and '.join(parts)}."
         if not self._allowed_at(trials)[k]:
@@ -249,11 +237,11 @@ class Requirements:
         are learnt from few trials and no bound on the outputs' smoothness is assumed, so that there is no proof, and of
         many trials the share 1 - safety may fail. What cannot be reached through safe inputs is never found.
         """
-        outputs = self._outputs(trials)
+        outputs = self._outputs.required(trials)
         fails = self._where_it_fails(trials)
         if self.region is None and not outputs and fails is None:
             return None
-        share = 1.0 - (1.0 - self.level) / max(len(self._limited), 1)
+        share = 1.0 - (1.0 - self.level) / max(len(self._outputs.limited), 1)
         ranking = self._ranking
         perturbations = Perturbations(exact(self._box.dimension)) if ranking.exact_inputs else ranking.coarse
         within: tuple[Requirement, ...] = tuple(
@@ -291,7 +279,7 @@ class Requirements:
 
     def strict(self, trials: Trials) -> Admission | None:
         """Return what an answer has to respect that was never tried; None for nothing."""
-        outputs, model = self._outputs(trials), self._where_it_fails(trials)
+        outputs, model = self._outputs.required(trials), self._where_it_fails(trials)
         if self.region is None and not outputs and model is None:
             return None
         succeeds = None if model is None else Succeeds(model, self._ranking.accurate)
@@ -325,55 +313,3 @@ class Requirements:
             if len(holes):
                 return holes[0]
         return rng.random(self._box.dimension) if self.region is None else self.region.draw(1, rng)[0]
-
-    # --- inside -------------------------------------------------------------------------------------------------
-
-    def posteriors(self, trials: Trials) -> dict[str, Posterior]:
-        """Return the models of all outputs that have been measured, watched ones included, by name."""
-        return {self.limits[k].name: self._posterior(trials, k) for k in self._measured(trials)}
-
-    def _outputs(self, trials: Trials) -> list[tuple[Posterior, Limit]]:
-        return [(self._posterior(trials, k), self.limits[k]) for k in self._measured(trials) if k in self._limited]
-
-    @staticmethod
-    def _measured(trials: Trials) -> list[int]:
-        return np.flatnonzero(np.isfinite(trials.outputs).any(axis=0)).tolist()
-
-    def _posterior(self, trials: Trials, k: int) -> Posterior:
-        told = trials.of_output(k)
-        if self.safety is None or self.limits[k].watched:
-            return self._models[k].posterior(told)
-        # Trials that all keep well within the limit show little of what the output may do elsewhere: until they show
-        # more, it may differ by as much as the limit is away.
-        known = self._cautious.get(k)
-        if known is not None and known[0] == len(told):
-            return known[1]
-        limit, y = self.limits[k], told.values
-        away = min(abs(end - float(y.mean())) for end in (limit.lower, limit.upper) if np.isfinite(end))
-        wide = (float(y.mean()) - 2.0 * away, float(y.mean()) + 2.0 * away) if away > 0.0 else None
-        posterior = self._model(GaussianProcess(noise=self._noise, output_range=wide), k).posterior(told)
-        self._cautious[k] = (len(told), posterior)
-        return posterior
-
-    def _model(self, surrogate: GaussianProcess, k: int) -> ResponseModel:
-        return ResponseModel(
-            surrogate,
-            self._box,
-            straying=self._straying,
-            lattice=self._lattice,
-            continues_chains=False,
-            seed=self._seed + 1 + k,
-            screened=False,
-        )
-
-    def _missed(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return by how much outputs (t, c) are beyond their limits, negative inside, (t, c)."""
-        columns = [self.limits[k].missed_by(told[:, i]) for i, k in enumerate(self._limited)]
-        return np.reshape(columns, (len(columns), len(told))).T
-
-    def _beyond(self, trials: Trials) -> NDArray[np.float64]:
-        """Return the largest miss of each trial in ranges of that output, (t,); NaN where not all was measured."""
-        told = trials.outputs[:, list(self._limited)]
-        measured = told[np.isfinite(told).all(axis=1)]
-        scale = np.ptp(measured, axis=0) if len(measured) else np.ones(told.shape[1])
-        return (np.maximum(self._missed(told), 0.0) / np.where(scale > 0.0, scale, 1.0)).max(axis=1, initial=0.0)

@@ -1,6 +1,6 @@
 """What the optimizer believes of the response: its surrogate, conditioned on the trials told so far."""
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inp
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate
 from surehold.optimization.surrogates.success.beta_process import BetaProcess
 from surehold.optimization.surrogates.success.model import SuccessProcess
+from surehold.optimization.surrogates.success.preference import PreferenceProcess
 from surehold.optimization.trials import Trials
 from surehold.store import background
 
@@ -116,10 +117,12 @@ class ResponseModel:
         return posterior
 
     def _conditioned(self, trials: Trials) -> Posterior:
-        model: object = self._surrogate
+        model: Any = self._surrogate
         if isinstance(model, (SuccessProcess, BetaProcess)):
             rng = np.random.default_rng([self._seed, 1, 0])
             return model.condition(trials.reached, trials.values, rng, trials=trials.executions.astype(np.float64))
+        if isinstance(model, PreferenceProcess):
+            return model.condition(trials.reached, trials.pairs, np.random.default_rng([self._seed, 1, 0]))
         values = trials.modelled if self._screened else trials.values
         if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self._straying.unit_roots(self._box, trials.commanded).copy()

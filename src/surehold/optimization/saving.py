@@ -57,6 +57,7 @@ def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], t
                 strict=True,
             )
         ],
+        **({"preferences": trials.pairs.tolist()} if len(trials.pairs) else {}),
         "pending": [
             {"number": number, "commanded": u.tolist()}
             for number, u in zip(trials.pending_numbers, trials.pending, strict=True)
@@ -99,7 +100,7 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
         settings = {name: _restored(name, value) for name, value in {**data["settings"], **given}.items()}
         told, pending = data["trials"], data["pending"]
         limits = limits_of(settings.get("constraints"))
-        trials = Trials(box, limits, settings.get("outcome") == "success")
+        trials = Trials(box, limits, settings.get("outcome", "value") != "value")
         trials.restore_cube(
             [trial["commanded"] for trial in told],
             [np.nan if trial["value"] is None else trial["value"] for trial in told],
@@ -109,6 +110,7 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
             np.array([trial.get("outputs", []) for trial in told], dtype=np.float64).reshape(len(told), len(limits)),
             np.array([trial.get("executions", 1) for trial in told], dtype=np.intp),
             np.array([trial.get("noise", 0.0) for trial in told], dtype=np.float64),
+            data.get("preferences", ()),
         )
         inputs = np.concatenate([trials.commanded, trials.pending])
         if not (np.isfinite(trials.reached).all() and np.all((inputs >= 0.0) & (inputs <= 1.0))):

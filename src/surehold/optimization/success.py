@@ -7,40 +7,51 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import InputError
+from surehold.errors import InputError, unknown_name
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.recommendation import Outcome, Recommendation
+from surehold.optimization.surrogates.named import SURROGATES
 from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.surrogates.success.beta_process import BetaProcess
 from surehold.optimization.surrogates.success.model import SuccessProcess
 
-__all__ = ["BETA_PROCESS", "MOST_EXECUTIONS", "check_combination", "counted", "described", "success_surrogate"]
+__all__ = [
+    "MOST_EXECUTIONS",
+    "SUCCESS_SURROGATES",
+    "check_combination",
+    "counted",
+    "described",
+    "success_surrogate",
+]
 
-#: Name of the surrogate that counts successes near by.
-BETA_PROCESS: Final = "beta_process"
+#: Names of the surrogates of successes; the first is what None stands for.
+SUCCESS_SURROGATES: Final = ("probit", "beta_process")
 #: Executions of one trial; more tell nothing more, and could not be counted exactly in their share.
 MOST_EXECUTIONS: Final = 1_000_000
 
 
 def success_surrogate(surrogate: Any) -> SuccessProcess | BetaProcess:
     """Return the surrogate of successes that a setting stands for; raises InputError where it is none."""
-    if surrogate is None:
+    if surrogate is None or surrogate == "probit":
         return SuccessProcess()
     if isinstance(surrogate, (SuccessProcess, BetaProcess)):
         return surrogate
-    if surrogate == BETA_PROCESS:
+    if surrogate == "beta_process":
         return BetaProcess()
+    if isinstance(surrogate, str) and surrogate not in SURROGATES:
+        raise unknown_name("surrogate of successes", surrogate, SUCCESS_SURROGATES)
     raise InputError(
-        f"surrogate={surrogate!r} cannot be combined with outcome='success', whose model is of probabilities; leave it "
-        f"out for a Gaussian process behind a probit likelihood, or say '{BETA_PROCESS}' for counts near by."
+        f"surrogate={surrogate!r} cannot be combined with outcome='success', whose model is of probabilities; choose "
+        f"one of: {', '.join(SUCCESS_SURROGATES)}."
     )
 
 
 def check_combination(settings: Mapping[str, Any]) -> None:
-    """Raise InputError for settings of `Optimizer`, other than their defaults, that success has no use for."""
+    """Raise InputError for settings of `Optimizer`, other than their defaults, that the outcome has no use for."""
+    preference = settings["outcome"] == "preference"
     defaults = {
         "direction": "maximize",
-        "criterion": None,
+        **({"surrogate": None, "failures": None, "conditions": "commanded"} if preference else {"criterion": None}),
         "noise": None,
         "output_range": None,
         "risk": "mean",
@@ -53,8 +64,9 @@ def check_combination(settings: Mapping[str, Any]) -> None:
         given = settings.get(name, value)
         if not (given is value or (isinstance(given, (str, bool)) and given == value)):
             raise InputError(
-                f"{name}={given!r} cannot be combined with outcome='success', which maximizes the probability of "
-                f"success by a criterion of its own; leave {name} out."
+                f"{name}={given!r} cannot be combined with outcome={settings['outcome']!r}, "
+                + ("which has a model" if preference else "which maximizes the probability of success by a criterion")
+                + f" of its own; leave {name} out."
             )
 
 
@@ -66,6 +78,8 @@ def counted(
     Raises InputError where values and successes are mixed, or what was told is no outcome.
     """
     told = success is not None or successes is not None or of is not None
+    if outcome == "preference" and failed != "rig":
+        raise InputError("this optimizer is told preferences: tell_preference(better, worse).")
     if outcome != "success":
         if told:
             raise InputError(

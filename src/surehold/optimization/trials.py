@@ -13,12 +13,20 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.defaults import OUTLIER_DISTANCE, ROUNDED
+from surehold.defaults import ROUNDED
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit, checked_outputs
+from surehold.optimization.points import column_of
 from surehold.optimization.trial_inputs import trial_input, trial_inputs
-from surehold.optimization.values import number_of
+from surehold.optimization.values import (
+    LARGEST,
+    LARGEST_SQUARED,
+    checked_pairs,
+    number_of,
+    outliers_among,
+    shares_won,
+)
 
 __all__ = ["AskedTrial", "Trials", "same"]
 
@@ -56,6 +64,7 @@ class Trials:
         self._executions: list[int] = []
         self._deviations: list[float] = []
         self._counted: Final = counted
+        self._pairs: list[tuple[int, int]] = []
         self._commanded: list[NDArray[np.float64]] = []
         self._reached: list[NDArray[np.float64]] = []
         self._values: list[float] = []
@@ -102,6 +111,11 @@ class Trials:
         return np.array(self._deviations, dtype=np.float64)
 
     @property
+    def pairs(self) -> NDArray[np.intp]:
+        """Rows of trials that were compared, (p, 2), the preferred one first."""
+        return np.array(self._pairs, dtype=np.intp).reshape(-1, 2)
+
+    @property
     def numbers(self) -> NDArray[np.intp]:
         """Numbers of the trials told, (t,)."""
         return np.array(self._numbers, dtype=np.intp)
@@ -141,19 +155,9 @@ class Trials:
     def outliers(self) -> NDArray[np.bool_]:
         """Whether each value lies so far below the others that it is no measurement of the response, (t,).
 
-        Such as a reading of -30 among values from 0 to 1, or a penalty of -1000 for a crash: it, and all that is lower,
-        lies below the others by more than `OUTLIER_DISTANCE` times their whole range. A third of the values or more
-        are no outliers, and where the others are all equal nothing can be said.
+        See `values.outliers_among`; shares of successes have none.
         """
-        values = self.values
-        if self._counted:
-            return np.zeros(len(values), dtype=bool)
-        told = np.sort(values[self.successful])
-        n = len(told)
-        unit = told / max(float(np.abs(told).max()), 1e-300) if n else told  # differences of the largest overflow
-        gap, above = np.diff(unit), (unit[-1:] - unit)[1:]
-        apart = np.flatnonzero((gap > OUTLIER_DISTANCE * above) & (above > 0.0) & (3 * np.arange(1, n) < n))
-        return values < told[apart[-1] + 1] if len(apart) else np.zeros(len(values), dtype=bool)
+        return np.zeros(len(self), dtype=bool) if self._counted else outliers_among(self.values)
 
     @property
     def modelled(self) -> NDArray[np.float64]:
@@ -207,6 +211,33 @@ class Trials:
         if number is not None:
             del self._pending[number]
 
+    def compare(self, better: Any, worse: Any) -> None:
+        """Record that an input was preferred to another one; see `Optimizer.tell_preference`.
+
+        The value of a trial is the share of its comparisons that it won. Nothing is recorded where one is bad.
+        """
+        places = [self._place_of(x) for x in (better, worse)]
+        if same(*places):
+            raise InputError(f"x = {self._box.as_dict(self._box.from_unit(places[0]))} is compared with itself.")
+        rows: list[int] = []
+        for x, u in zip((better, worse), places, strict=True):
+            known = np.flatnonzero(same(u, self.commanded))
+            if not len(known):
+                self.tell(x, 0.0, False, None)
+            rows.append(int(known[0]) if len(known) else len(self) - 1)
+        self._pairs.append((rows[0], rows[1]))
+        self._take_shares()
+
+    def _place_of(self, x: Any) -> NDArray[np.float64]:
+        """Return the place in the cube of x, which may have been told."""
+        if isinstance(x, AskedTrial) and x.number in self._numbers:
+            return self._commanded[self._numbers.index(x.number)]
+        return self._commanded_by(x)[1]
+
+    def _take_shares(self) -> None:
+        shares, made = shares_won(self.pairs, len(self))
+        self._values, self._executions = shares.tolist(), made.tolist()
+
     def restore(
         self,
         X: ArrayLike,
@@ -217,12 +248,13 @@ class Trials:
         outputs: ArrayLike | None = None,
         executions: ArrayLike | None = None,
         deviations: ArrayLike | None = None,
+        pairs: ArrayLike = (),
     ) -> None:
         """Take over stored trials; see `Optimizer.restore`. Nothing is taken over where an argument is bad."""
         inputs = trial_inputs(self._box, "X", X, inside=True)
         waiting = trial_inputs(self._box, "pending", pending, inside=True)
         actual = trial_inputs(self._box, "reached", reached, inside=False)
-        self.restore_cube(inputs, y, actual, waiting, numbers, outputs, executions, deviations)
+        self.restore_cube(inputs, y, actual, waiting, numbers, outputs, executions, deviations, pairs)
 
     def restore_cube(
         self,
@@ -234,25 +266,32 @@ class Trials:
         outputs: ArrayLike | None = None,
         executions: ArrayLike | None = None,
         deviations: ArrayLike | None = None,
+        pairs: ArrayLike = (),
     ) -> None:
         """Take over trials whose inputs are points of the unit cube, as they are."""
         d = self._box.dimension
         inputs, actual, waiting = (
             np.asarray(points, dtype=np.float64).reshape(-1, d) for points in (commanded, reached, pending)
         )
-        values = np.asarray(y, dtype=np.float64)
+        compared = checked_pairs(pairs, len(inputs))
+        values = np.zeros(len(inputs)) if len(compared) else np.asarray(y, dtype=np.float64)
         if values.shape != (len(inputs),) or len(actual) != len(inputs):
             raise InputError(
                 f"y has shape {values.shape} and reached {len(actual)} rows, but X has {len(inputs)} rows; give one "
                 "value and one reached input a trial."
             )
-        if np.isinf(values).any():
-            raise InputError(f"y holds infinity at row {int(np.argmax(np.isinf(values)))}; give NaN for failed trials.")
-        measured = np.full((len(inputs), len(self.limits)), np.nan) if outputs is None else np.asarray(outputs, float)
-        if measured.shape != (len(inputs), len(self.limits)) or np.isinf(measured).any():
+        if (huge := np.abs(values) > LARGEST).any():
+            row = int(np.argmax(huge))
             raise InputError(
-                f"outputs have shape {measured.shape}; give one finite number, or NaN, for each of {len(inputs)} "
-                f"trials and {len(self.limits)} constraints."
+                f"y holds {values[row]:g} at row {row}; give numbers up to {LARGEST:g}, or NaN for failed trials."
+            )
+        measured = (
+            np.full((len(inputs), len(self.limits)), np.nan) if outputs is None else column_of("outputs", outputs)
+        )
+        if measured.shape != (len(inputs), len(self.limits)) or (np.abs(measured) > LARGEST_SQUARED).any():
+            raise InputError(
+                f"outputs have shape {measured.shape}; give one number up to {LARGEST_SQUARED:g}, or NaN, for each of "
+                f"{len(inputs)} trials and {len(self.limits)} constraints."
             )
         of = np.ones(len(inputs), dtype=np.intp) if executions is None else np.asarray(executions)
         if of.shape != values.shape or (len(of) and (of.dtype.kind not in "iu" or np.any(of < 1))):
@@ -260,9 +299,9 @@ class Trials:
         whole = np.abs(of * values - np.round(of * values)) < 1e-6
         if self._counted and not np.all((values >= 0.0) & (values <= 1.0) & whole):
             raise InputError("y holds a number that is no share of successes; give successes divided by executions.")
-        spread = np.zeros(len(inputs)) if deviations is None else np.asarray(deviations, dtype=np.float64)
-        if spread.shape != values.shape or not np.all(np.isfinite(spread) & (spread >= 0.0)):
-            raise InputError("noise holds no standard deviation, a finite number of 0 or more, for some trial.")
+        spread = np.zeros(len(inputs)) if deviations is None else column_of("noise", deviations)
+        if spread.shape != values.shape or not np.all((spread >= 0.0) & (spread <= LARGEST_SQUARED)):
+            raise InputError(f"noise holds no standard deviation, 0 to {LARGEST_SQUARED:g}, for some trial.")
         total = len(inputs) + len(waiting)
         given = np.arange(total) if numbers is None or total == 0 else np.asarray(numbers)
         whole = given.shape == (total,) and given.dtype.kind in "iu" and np.all(given >= 0)
@@ -273,6 +312,9 @@ class Trials:
         self._commanded, self._reached = list(inputs), list(actual)
         self._values, self._numbers = values.tolist(), given[: len(values)].tolist()
         self._pending = dict(zip(given[len(values) :].tolist(), waiting, strict=True))
+        self._pairs = [(int(better), int(worse)) for better, worse in compared]
+        if self._pairs:
+            self._take_shares()
 
     def equal(self, other: "Trials") -> bool:
         """Tell whether the same trials have been told, in the same order; pending ones do not matter."""
@@ -283,6 +325,7 @@ class Trials:
             and np.array_equal(self.outputs, other.outputs, equal_nan=True)
             and np.array_equal(self.executions, other.executions)
             and np.array_equal(self.deviations, other.deviations)
+            and np.array_equal(self.pairs, other.pairs)
         )
 
     def of_output(self, k: int) -> "Trials":

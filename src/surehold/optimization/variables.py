@@ -8,6 +8,8 @@ integer, log                    the logarithm of the value, in cells that end ha
 choice of k                     k coordinates in [0, 1], 1 for the choice that is taken (one-hot)
 """
 
+import re
+from math import isfinite
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -18,6 +20,7 @@ from surehold.errors import InputError, unknown_name
 __all__ = ["Choice", "Number", "Variable", "variable_of"]
 
 _LARGEST: Final = 1e100  # magnitude of a bound; what is computed with larger ones overflows
+_LONE: Final = re.compile("[\ud800-\udfff]")  # surrogates that are no pair
 _FORM: Final = (
     "give two numbers (lower, upper), with 'log', 'int' or 'step=0.5' behind them where wanted, or a list of texts"
 )
@@ -152,6 +155,10 @@ def variable_of(name: Any, given: Any) -> Variable:
     """
     if not isinstance(name, str) or not name:
         raise InputError(f"variable name {name!r} is not a non-empty string; name each variable, such as 'dx'.")
+    choices = [part for part in given if isinstance(part, str)] if isinstance(given, (list, tuple)) else []
+    for text in (name, *choices):
+        if _LONE.search(text):
+            raise InputError(f"{text!r} of variable {name!r} holds half a character, which no file can; write it anew.")
     if isinstance(given, (Number, Choice)):
         return given
     try:
@@ -164,7 +171,9 @@ def variable_of(name: Any, given: Any) -> Variable:
         if any(not isinstance(word, str) for word in words) and not chosen:
             raise TypeError
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"bounds of '{name}' are {given!r}; {_FORM}.") from None
+        shown = repr(given)
+        shown = shown if len(shown) <= 80 else f"{shown[:77]}..."
+        raise InputError(f"bounds of '{name}' are {shown}; {_FORM}.") from None
     return _choice(name, tuple(parts)) if chosen else _number(name, lower, upper, words)
 
 
@@ -213,6 +222,6 @@ def _finite(name: str, value: Any, what: str, wanted: str) -> float:
         number = float("nan") if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):
         number = float("nan")
-    if not np.isfinite(number):
+    if not isfinite(number):
         raise InputError(f"{what}: {name} is {str(value)[:60]!r}; give {wanted}.")
     return number

@@ -8,10 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, needed_input_noise
 from surehold.problems.problem import Problem, checked_points
 
 __all__ = ["RobustScore", "perturbed_points", "robust_score"]
+
+_MOST = 10_000_000  # perturbations; more is a slip of the pen
 
 
 @dataclass(frozen=True)
@@ -56,8 +58,8 @@ def perturbed_points(
     InputError
         If n is not a positive integer, or x lies outside the box.
     """
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
-        raise InputError(f"number of perturbations is {n!r}; give an integer of 1 or more.")
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= _MOST:
+        raise InputError(f"number of perturbations is {n!r}; give an integer from 1 to {_MOST:,}.")
     center, single = checked_points(x, box)
     if not single:
         raise InputError(f"x has shape {center.shape}; score one point ({box.dimension},) at a time.")
@@ -65,7 +67,7 @@ def perturbed_points(
         raise InputError(f"x = {center[0].tolist()} lies outside {box!r}; score a point of the box.")
     rng = np.random.default_rng(seed)
     unit = box.to_unit(center[0])
-    reached = unit + noise.draws(box, unit, int(n), rng)
+    reached = unit + needed_input_noise(noise, box.names).draws(box, unit, int(n), rng)
     if border == "extend":
         return box.lower + reached * box.widths
     outside = (reached < 0.0) | (reached > 1.0)

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, needed_input_noise
 from surehold.problems.border import Moments, moments_at_border
 from surehold.problems.problem import Optimum, checked_points
 
@@ -301,6 +301,7 @@ def highest(f: Callable[[NDArray[np.float64]], object], box: Box, starts: NDArra
 
 def _covariance(noise: InputNoise, box: Box) -> NDArray[np.float64]:
     """Return the covariance (d, d) of the noise in the units of the box."""
+    noise = needed_input_noise(noise, box.names)
     if noise.bounded or noise.varies:
         raise InputError(
             f"{noise!r} has no closed form; use robust_score, or Gaussian noise that is the same everywhere."

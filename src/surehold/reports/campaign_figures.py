@@ -1,6 +1,6 @@
 """Figures of campaigns: means with bands over the trials, functions, models and maps, each from a `Picture`."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,7 +38,9 @@ def draw_picture(picture: Picture) -> "Figure":
             for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
                 handles.setdefault(label, handle)
         if len(handles) > 1:
-            figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=5, fontsize=8.5)  # pyright: ignore[reportArgumentType]
+            columns = 5 if across > 1 else 3  # as many names as fit beside each other
+            named: list[Any] = [list(handles.values()), list(handles)]
+            figure.legend(*named, loc="outside lower center", ncols=columns, fontsize=8.5)
     return figure
 
 

@@ -209,7 +209,7 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
             ecolor=PALETTE[role],
             elinewidth=1.8,
             zorder=6,
-            label=candidate.label,
+            label=candidate.label if report.succeeded else report.called(candidate),
         )
     everything = np.concatenate([view.mean, report.y[ok]])
     margin = 0.25 * (everything.max() - everything.min()) or 1.0
@@ -239,7 +239,7 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             linewidth=1.8,
             label=f"{report.extreme} value so far",
         )
-    if report.robust_trace is not None and np.isfinite(report.robust_trace).any():
+    if report.robust_trace is not None and report.succeeded and np.isfinite(report.robust_trace).any():
         axes.plot(
             k,
             report.robust_trace,

@@ -35,7 +35,11 @@ _OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
 
 def answers(result: Result) -> dict[str, int]:
     """Return the trials to show by label, the best "observed" and "recommended"; one entry if they are the same."""
-    recommended = int(np.argmin(np.abs(result.optimizer.box.to_unit(result.X) - _unit_answer(result)).max(axis=1)))
+    box = result.optimizer.box
+    apart = np.abs(box.to_unit(result.X) - _unit_answer(result))
+    if box.uncontrolled is not None:  # an answer has no condition: trials are of what can be set
+        apart = apart[:, ~box.uncontrolled.held]
+    recommended = int(np.argmin(apart.max(axis=1)))
     if result.optimizer.outcome == "success":  # a trial that succeeded is no peak
         return {"recommended": recommended}
     highest = result.best_index
@@ -65,9 +69,10 @@ def candidate(
             for share in _SHARES
         }
         details = {**{name: f"{100.0 * p:.0f} %" for name, p in sure.items()}, **(details or {})}
+    held = result.optimizer.box.uncontrolled
     return Candidate(
         label,
-        result.X[index],
+        result.X[index] if told is None or held is None else told.x,  # an answer says no condition but their mean
         float(result.y[index]),
         index,
         np.empty(0) if score is None else score.values,

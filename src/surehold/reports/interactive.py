@@ -62,7 +62,7 @@ def _line(report: RunReport, surface: Surface) -> dict[str, Any]:
         data.append(
             _points(x[surface.variables[0] : surface.variables[0] + 1] * variable.factor, y, name, _mark(color))
         )
-    return _plot("Model", data, variable.label, report.quality_name)
+    return _plot("Model" + _aside(surface), data, variable.label, report.quality_name)
 
 
 def _map(report: RunReport, surface: Surface, values: NDArray[np.floating], title: str) -> dict[str, Any]:
@@ -84,8 +84,11 @@ def _map(report: RunReport, surface: Surface, values: NDArray[np.floating], titl
     for x, _, name, color in _candidates(report):
         spot = _scaled(x[a : a + 1], first), _scaled(x[b : b + 1], second)
         data.append(_points(*spot, name, _mark(color)))
-    note = f" ({surface.note})" if surface.note else ""
-    return _plot(title + note, data, first.label, second.label)
+    return _plot(title + _aside(surface), data, first.label, second.label)
+
+
+def _aside(surface: Surface) -> str:
+    return f" ({surface.note})" if surface.note else ""
 
 
 def _candidates(report: RunReport) -> list[tuple[NDArray[np.floating], NDArray[np.floating], str, str]]:
@@ -114,10 +117,12 @@ def _curve(x: NDArray[Any], y: NDArray[Any], name: str, color: str, shape: str =
 
 def _plot(title: str, data: list[dict[str, Any]], across: str, up: str) -> dict[str, Any]:
     layout = {
-        "title": {"text": title},
+        "title": {"text": title, "x": 0.02, "font": {"size": 14}},  # beside the buttons at the right
         "xaxis": {"title": {"text": across}},
         "yaxis": {"title": {"text": up}},
-        "legend": {"orientation": "h", "y": -0.25},
+        "modebar": {"remove": ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d"]},
+        "margin": {"t": 56, "r": 24, "b": 60 + 19 * len(data)},  # the names below each other, where it is narrow
+        "legend": {"orientation": "h", "yref": "container", "y": 0.0, "yanchor": "bottom"},
     }
     return {"data": data, "layout": layout}
 

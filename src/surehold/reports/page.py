@@ -64,7 +64,7 @@ def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
             words=glossary(report),
             settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
             trials=trials,
-            **scene_context(shown, [_scene_note(c) for c in shown], [_label(report, c) for c in shown]),
+            **scene_context(shown, [_scene_note(report, c) for c in shown], [_label(report, c) for c in shown]),
         )
     )
 
@@ -106,6 +106,7 @@ def scene_context(
         "scene_first": opening,
         "scene_moves": any(_moves(c.scene) for c in shown if c.scene is not None),
         "scene_legend": next((c.scene.legend for c in shown if c.scene is not None and c.scene.legend), ""),
+        "scene_has_contacts": any(c.scene is not None and c.scene.contacts is not None for c in shown),
         "scene_has_neighbors": any(c.scene is not None and c.scene.neighbors is not None for c in shown),
         "scene_has_box": any(c.scene is not None and c.scene.box is not None for c in shown),
         "three": Markup("" if scene is None else _vendored("three.bundle.min.js")),
@@ -130,11 +131,9 @@ def _vendored(name: str) -> str:
 def _label(report: RunReport, candidate: Candidate) -> dict[str, str]:
     alone = len(report.candidates) == 1
     role = "high" if candidate is report.observed and not alone else "answer"
-    text = candidate.label.capitalize()
-    if alone and not report.counted:
-        text = f"{report.extreme.capitalize()} observed = recommended"
-    if not report.succeeded:
-        role, text = "high", f"No success: {f'the {report.extreme} trial' if alone else candidate.label}"
+    role = role if report.succeeded else "high"
+    text = report.called(candidate)
+    text = text[0].upper() + text[1:]
     return {"role": role, "mark": "▲" if role == "high" else "●", "text": text}
 
 
@@ -148,9 +147,10 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         tag = "refused" if label["role"] == "high" else "holds better"
     svg = None
     if shaken and not report.counted:
+        what = f"the {candidate.label} point" if report.succeeded else report.called(candidate)
         name = f"shake-{label['role']}"
         text = (
-            f"Histogram of {candidate.values.size} re-queries of the {candidate.label} point: mean "
+            f"Histogram of {candidate.values.size} re-queries of {what}: mean "
             f"{number(candidate.mean)}, worst {number(candidate.worst)}"
         )
         svg = Markup(figures.inline_svg(drawings[figures.shake_name(candidate)], name, text))
@@ -173,8 +173,9 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
     }
 
 
-def _scene_note(candidate: Candidate) -> str:
-    parts = [f"{candidate.label.capitalize()}: {number(candidate.quality)} when hit exactly"]
+def _scene_note(report: RunReport, candidate: Candidate) -> str:
+    name = candidate.label if report.succeeded else report.called(candidate)
+    parts = [f"{name[0].upper()}{name[1:]}: {number(candidate.quality)} when hit exactly"]
     if candidate.values.size:
         parts.append(f"{number(candidate.mean)} on average and {number(candidate.worst)} at worst when off")
     if candidate.scene is not None and candidate.scene.contacts is not None:
@@ -285,7 +286,7 @@ def _trials(report: RunReport) -> list[dict[str, Any]]:
             notes.append(f"{report.extreme} observed")
             style = "best"
         if report.recommended.trial == i:
-            notes.append("recommended")
+            notes.append("recommended" if report.succeeded else "shown")
             style = "chosen"
         failed = not np.isfinite(y)
         rows.append(

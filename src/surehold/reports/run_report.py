@@ -219,6 +219,13 @@ class RunReport:
             return False
         return bool(told.size) and (self.success_above is None or float(told.max()) > self.success_above)
 
+    def called(self, candidate: Candidate) -> str:
+        """Return what a candidate is called where it is shown; where no trial succeeded, nothing is recommended."""
+        if not self.succeeded:
+            return f"no success: the {f'{self.extreme} trial' if candidate is self.observed else 'point shown'}"
+        alone = len(self.candidates) == 1 and not self.counted
+        return f"{self.extreme} observed = recommended" if alone else candidate.label
+
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Which trials gave no value, (n,)."""

@@ -69,7 +69,10 @@ def begin(marker: Path | None, code: str, settings: bytes) -> None:
     except Timeout:
         _elsewhere.append(marker)
         return
-    except OSError:  # nothing can be written there after all
+    except OSError as error:  # nothing can be written there after all
+        from surehold.store.kernels import say_once
+
+        say_once(error)
         return
     paths = os.pathsep.join(path for path in sys.path if path)
     try:

@@ -18,7 +18,7 @@ from typing import Any
 import numba
 from numba.core import config
 
-__all__ = ["njit"]
+__all__ = ["njit", "say_once"]
 
 _log = logging.getLogger("surehold")
 _said: list[bool] = []  # holds something once the warning has been given
@@ -38,7 +38,7 @@ def njit(*signatures: Any, cache: bool = True, **options: Any) -> Any:
             if "cannot cache" not in str(error):
                 raise
         except OSError as error:  # of a function that is compiled at once: the disk is full
-            _say_once(error)
+            say_once(error)
             return plain(function)
         settings: Any = config
         before = settings.CACHE_DIR
@@ -46,7 +46,7 @@ def njit(*signatures: Any, cache: bool = True, **options: Any) -> Any:
             settings.CACHE_DIR = str(_private_folder())
             return _saving_where_possible(kept(function))
         except (RuntimeError, OSError) as error:
-            _say_once(error)
+            say_once(error)
             return plain(function)
         finally:
             settings.CACHE_DIR = before
@@ -65,7 +65,7 @@ def _saving_where_possible(dispatcher: Any) -> Any:
         try:
             save(*arguments)
         except OSError as error:  # the function itself is compiled and works
-            _say_once(error)
+            say_once(error)
 
     kept.save_overload = save_overload
     return dispatcher
@@ -97,7 +97,8 @@ def _private_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="surehold-kernels-"))
 
 
-def _say_once(error: Exception) -> None:
+def say_once(error: Exception) -> None:
+    """Warn, once in a process, that compiled kernels cannot be kept, and say what to do."""
     if not _said:
         _said.append(True)
         reason = getattr(error, "strerror", None) or error

@@ -11,6 +11,7 @@ Trials outside of the search space (other parameters, other ranges) are left out
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -19,9 +20,10 @@ from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError
 from surehold.optimization.success import MOST_EXECUTIONS
+from surehold.optimization.values import LARGEST, LARGEST_SQUARED
 from surehold.studies.search_space import SearchSpace
 
-__all__ = ["CONTACTS", "EXECUTIONS", "OUTPUTS", "REACHED", "History", "history_of", "parameters_of"]
+__all__ = ["CONTACTS", "EXECUTIONS", "OUTPUTS", "REACHED", "History", "Reader", "history_of", "parameters_of"]
 
 #: Trial attribute that holds the parameters that were truly reached.
 REACHED: Final = "surehold:reached"
@@ -62,36 +64,75 @@ def history_of(
 
     `outputs` are the names of further outputs.
     """
-    ordered = sorted(trials, key=lambda trial: trial.number)
-    told: list[_Told] = []
-    pending: list[Mapping[str, Any]] = []
-    trial = None
-    try:
-        retried = set[int]()
-        for trial in ordered:
-            retried.update(trial.system_attrs.get("retry_history", ()))
-        for trial in ordered:
-            if trial.number == number or trial.number in retried:
-                continue
-            parameters = parameters_of(trial)
-            if not space.contains(parameters):
-                continue
-            if trial.state.is_finished():
-                told.append(_told(trial, parameters, space, outputs))
-            else:
-                pending.append(parameters)
-    except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
-        which = "a trial" if trial is None else f"trial {trial.number}"
-        raise InputError(f"{which} of the study is damaged ({error}); restore a copy of the storage.") from error
-    return History(
-        space.encode_all([row.parameters for row in told]),
-        np.array([row.value for row in told], dtype=np.float64),
-        space.encode_all([row.reached for row in told], anywhere=True),
-        space.encode_all(pending),
-        np.array([row.number for row in told], dtype=np.intp),
-        np.array([row.measured for row in told], dtype=np.float64).reshape(len(told), len(outputs)),
-        np.array([row.executions for row in told], dtype=np.intp),
-    )
+    return Reader(space, outputs).read(trials, number)
+
+
+class Reader:
+    """Reads what the trials of a study say; what a finished one says is kept, for it does not change any more."""
+
+    def __init__(self, space: SearchSpace, outputs: Sequence[str] = ()):
+        self._space: Final = space
+        self._outputs: Final = tuple(outputs)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._known: dict[int, FrozenTrial] = {}
+        self._retried: set[int] = set()
+        self._history = self._of([])  # of the finished trials of this space, in the order in which they were read
+
+    def read(self, trials: Iterable[FrozenTrial], number: int | None = None) -> History:
+        """Return what all trials of the study say, as `history_of` does.
+
+        Raises InputError, naming the trial, where what is stored of one cannot be read.
+        """
+        trials = list(trials)
+        fresh = [trial for trial in trials if self._known.get(trial.number) is not trial]
+        if len(trials) - len(fresh) != len(self._known):  # of another study, or copies
+            self._forget()
+            fresh = trials
+        told: list[_Told] = []
+        pending: dict[int, Mapping[str, Any]] = {}
+        known: dict[int, FrozenTrial] = {}
+        retried, of_pending = set[int](), set[int]()
+        trial = None
+        try:
+            for trial in sorted(fresh, key=lambda trial: trial.number):
+                finished = trial.state.is_finished()
+                (retried if finished else of_pending).update(trial.system_attrs.get("retry_history", ()))
+                parameters = parameters_of(trial)
+                inside = self._space.contains(parameters)
+                if finished:
+                    known[trial.number] = trial
+                    told += [_told(trial, parameters, self._space, self._outputs)] if inside else []
+                elif inside:
+                    pending[trial.number] = parameters
+        except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+            which = "a trial" if trial is None else f"trial {trial.number}"
+            raise InputError(f"{which} of the study is damaged ({error}); restore a copy of the storage.") from error
+        if told:
+            self._history = History._make(map(np.concatenate, zip(self._history, self._of(told), strict=True)))
+        self._known |= known
+        self._retried |= retried
+        left_out = self._retried | of_pending | {number}
+        numbers = self._history.numbers
+        rows = np.argsort(numbers, kind="stable")
+        rows = rows[~np.isin(numbers[rows], [k for k in left_out if isinstance(k, int)])]
+        under_way = self._space.encode_all([row for k, row in pending.items() if k not in left_out])
+        told_so_far = self._history._replace(pending=self._history.X)  # any rows
+        return History._make(each[rows] for each in told_so_far)._replace(pending=under_way)
+
+    def _of(self, rows: Sequence["_Told"]) -> History:
+        """Return the history of finished trials."""
+        X = self._space.encode_all([row.parameters for row in rows])
+        return History(
+            X,
+            np.array([row.value for row in rows], dtype=np.float64),
+            self._space.encode_all([row.reached for row in rows], anywhere=True),
+            X[:0],
+            np.array([row.number for row in rows], dtype=np.intp),
+            np.array([row.measured for row in rows], dtype=np.float64).reshape(len(rows), len(self._outputs)),
+            np.array([row.executions for row in rows], dtype=np.intp),
+        )
 
 
 class _Told(NamedTuple):
@@ -107,23 +148,23 @@ class _Told(NamedTuple):
 
 def _told(trial: FrozenTrial, parameters: Mapping[str, Any], space: SearchSpace, outputs: Sequence[str]) -> _Told:
     value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
-    value = value if np.isfinite(value) else np.nan
+    value = value if abs(value) <= LARGEST else np.nan
     actual = {**parameters, **trial.user_attrs.get(REACHED, {})}
-    attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
+    attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {}) if outputs else {}
     of = trial.user_attrs.get(EXECUTIONS, 1)
     return _Told(
         trial.number,
         parameters,
-        actual if space.encodes(actual) else parameters,
+        actual if actual != parameters and space.encodes(actual) else parameters,
         value,
         [_finite(attributes.get(name)) for name in outputs],
-        of if type(of) is int and 0 < of <= MOST_EXECUTIONS and np.isfinite(value) else 1,
+        of if type(of) is int and 0 < of <= MOST_EXECUTIONS and isfinite(value) else 1,
     )
 
 
 def _finite(value: Any) -> float:
     """Return a number; NaN of what is none."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST_SQUARED:
         return np.nan
     return float(value)
 

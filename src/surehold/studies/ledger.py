@@ -16,6 +16,7 @@ from surehold.studies.history import CONTACTS, EXECUTIONS, OUTPUTS, REACHED
 from surehold.studies.search_space import SearchSpace
 
 __all__ = [
+    "BEHIND",
     "HOLDER",
     "NOTE",
     "PROMISE",
@@ -31,11 +32,12 @@ __all__ = [
 ]
 
 #: Trial attributes: who makes the trial (a `Holder`), what the model expected to gain, how the trial came about, why it
-#: was forbidden.
+#: was forbidden, how many told answers its model did not know.
 HOLDER: Final = "surehold:holder"
 PROMISE: Final = "surehold:promise"
 NOTE: Final = "surehold:note"
 VETOED: Final = "surehold:vetoed"
+BEHIND: Final = "surehold:behind"
 
 _ATTEMPTS: Final = 5  # a trial that has taken so many workers with it counts as failed
 _LARGEST: Final = 1e100  # magnitude of a value; squares and variances of larger ones overflow
@@ -65,7 +67,7 @@ class Told:
 
     id: int
     state: str
-    """"complete" or "failed" """
+    """"complete", "failed", or "waiting" for a trial that is asked for again"""
     value: float | None
     already: bool
     """whether the same answer had been given before"""
@@ -127,8 +129,8 @@ class Ledger:
     def orphan(self, trials: list[FrozenTrial], now: float) -> FrozenTrial | None:
         """Return the first running trial whose holder is dead; one that has killed too many is failed instead."""
         for trial in trials:
-            holder = holder_of(trial)
-            if trial.state != TrialState.RUNNING or holder is None or holder.until is None or now <= holder.until:
+            holder = holder_of(trial) if trial.state == TrialState.RUNNING else None
+            if holder is None or holder.until is None or now <= holder.until:
                 continue
             if holder.attempts < _ATTEMPTS:
                 return trial
@@ -190,6 +192,15 @@ class Ledger:
                 "answer counts; add the other one as a trial of its own if it was made."
             )
         return Told(id, state, number, True, executions)
+
+    def let_go(self, id: int) -> Told:
+        """Store that a trial is to be made again, whoever asks first, since it was not the place that failed."""
+        trial = self.trial(id)
+        if trial.state != TrialState.RUNNING:
+            what = answer_of(trial) if trial.state.is_finished() else "has not been handed out"
+            raise AnswerRefused(f"trial {id} is not under way ({what}); a fault of the rig is told of one that is.")
+        self.hold(trial, Holder("", 0.0, 0))
+        return Told(id, "waiting", None, False)
 
     def veto(self, id: int, reason: str) -> None:
         """Store that a trial must not be made; see `RobotStudy.veto`."""

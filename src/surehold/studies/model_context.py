@@ -3,7 +3,7 @@
 The same words as over HTTP (`studies.service`), on the standard input and output of the process that the host started.
 """
 
-from typing import Any
+from typing import Any, Literal
 
 from surehold import __version__
 from surehold.extras import require
@@ -20,6 +20,8 @@ except ImportError:
 from surehold.errors import SureholdError
 
 __all__ = ["model_context_server"]
+
+_Value = float | Literal["success", "failure"] | None
 
 _INSTRUCTIONS = """Study '{name}' looks for parameters whose outcome is good and stays good when the input is off. Make
 trials in turn: ask, try the parameters in the real world, tell the value ({direction} it) or that the trial failed.
@@ -53,7 +55,7 @@ def model_context_server(study: RobotStudy) -> MCPServer:
     @server.tool()
     def tell(
         id: int,
-        value: float | None = None,
+        value: _Value = None,
         failed: bool = False,
         reached: dict[str, Any] | None = None,
         successes: int | None = None,
@@ -61,10 +63,10 @@ def model_context_server(study: RobotStudy) -> MCPServer:
     ) -> dict[str, Any]:
         """Say what came of a trial: its value, or that it failed; `reached` are the parameters truly reached.
 
-        Where the study is about success: successes of so many executions, in place of the value.
+        Where the study is about success the value is success or failure; or tell successes of so many executions.
         """
         told = answered(study.tell, id, value, failed=failed, reached=reached, successes=successes, of=of)
-        return {"id": told.id, "state": told.state, "value": told.value, "already": told.already}
+        return {"id": told.id, "state": told.state, "value": told.value, "already": told.already, "of": told.of}
 
     @server.tool()
     def recommend() -> dict[str, Any]:
@@ -77,9 +79,15 @@ def model_context_server(study: RobotStudy) -> MCPServer:
         return {"parameters": answered(study.next), "expected_improvement": answered(study.promise)}
 
     @server.tool()
-    def add(parameters: dict[str, Any], value: float | None = None, failed: bool = False) -> dict[str, Any]:
-        """Store a trial that was made without being asked for."""
-        return {"id": answered(study.add, parameters, value, failed=failed)}
+    def add(
+        parameters: dict[str, Any],
+        value: _Value = None,
+        failed: bool = False,
+        successes: int | None = None,
+        of: int | None = None,
+    ) -> dict[str, Any]:
+        """Store a trial that was made without being asked for; its outcome as of tell."""
+        return {"id": answered(study.add, parameters, value, failed=failed, successes=successes, of=of)}
 
     @server.tool(name="status")
     def state() -> dict[str, Any]:

@@ -13,7 +13,7 @@ from optuna.study import Study
 from surehold.errors import InputError
 from surehold.optimization.recommendation import outliers_in_words
 from surehold.studies.dashboard_note import read_note, write_note
-from surehold.studies.history import REACHED, history_of
+from surehold.studies.history import REACHED
 from surehold.studies.sampler import Sampler, direction_of
 
 __all__ = ["RECOMMENDATION", "StudyRecommendation", "find_recommendation", "recommend", "written"]
@@ -102,17 +102,19 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     sign = 1.0 if direction == "maximize" else -1.0
     trials = study.get_trials(deepcopy=False)
     space = sampler.search_space(study)
-    history = history_of(trials, space, outputs=sampler.outputs)
+    history = sampler.history(trials, space)
     with sampler.optimizing(space, history, direction) as optimizer:
         best = optimizer.recommend()
         told = np.flatnonzero(np.isfinite(history.y))
         distance = np.abs(optimizer.box.to_unit(history.reached[told]) - optimizer.box.to_unit(best.x)).max(axis=1)
+        # what was reached outside of the ranges cannot be commanded: the nearest place that can is the answer
+        inside = [optimizer.box.contains(place) for place in history.reached]
     same = told[distance <= distance.min() + 1e-9]
     row, best_row = int(same[np.argmax(sign * history.y[same])]), int(np.nanargmax(sign * history.y))
     number, best_number = int(history.numbers[row]), int(history.numbers[best_row])
     trial = next(t for t in trials if t.number == number)
     return StudyRecommendation(
-        trial.params | trial.user_attrs.get(REACHED, {}),
+        trial.params | (trial.user_attrs.get(REACHED, {}) if inside[row] else best.parameters),
         number,
         best.mean,
         best.std,

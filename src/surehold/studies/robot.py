@@ -6,20 +6,20 @@ believed dead, is accepted as long as the one that took the trial up again has n
 """
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import optuna
 from optuna.study import Study, StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
-from surehold.errors import InputError, SureholdError
+from surehold.errors import InputError, SureholdError, unknown_name
 from surehold.optimization.limits import checked_outputs, limits_of
-from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, history_of, parameters_of
-from surehold.studies.ledger import HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
+from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
+from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Ledger, Told, checked_value, holder_of
 from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend, written
 from surehold.studies.settings import SETTINGS, StudySettings
 from surehold.studies.stop_rule import StopRule
@@ -33,6 +33,8 @@ __all__ = ["Asked", "NothingToAsk", "RobotStudy"]
 
 _PAUSED: Final = "surehold:paused"  # study attribute: why; None where it is not paused
 _STOP: Final = "surehold:stop"  # study attribute: a `StopRule`
+
+Proposals = Callable[[list[FrozenTrial]], tuple[dict[str, Any], int] | None]
 
 
 class NothingToAsk(SureholdError):
@@ -56,6 +58,8 @@ class Asked:
     """whether it has been handed out before"""
     pose: dict[str, Any] | None = None
     """of the palm in the object's frame, where the study is about a shape that is touched"""
+    behind: int = 0
+    """told answers that the model of this trial did not know, see `surehold.studies.prepared`"""
 
 
 class RobotStudy:
@@ -156,7 +160,9 @@ class RobotStudy:
 
     # --- asking ---------------------------------------------------------------------------------------------------
 
-    def ask(self, worker: str | None = None, *, lifetime: float | None = None) -> Asked:
+    def ask(
+        self, worker: str | None = None, *, lifetime: float | None = None, prepared: Proposals | None = None
+    ) -> Asked:
         """Hand out a trial.
 
         Parameters
@@ -167,6 +173,9 @@ class RobotStudy:
         lifetime
             Seconds for which the worker counts as alive, see `renew`; a trial whose worker is dead is handed out
             again before any new one. None: forever.
+        prepared
+            Gives, of all trials, the parameters of a new one and how many told answers they are behind, or None where
+            the model is to be asked; see `surehold.studies.prepared`.
 
         Raises
         ------
@@ -195,8 +204,10 @@ class RobotStudy:
                 trial = self._ledger.trial(self.study.ask(self.settings.space.distributions).number)
                 self._ledger.hold(trial, holder)
             else:
-                parameters = self._suggested(trials)
+                found = None if prepared is None else prepared(trials)
+                parameters, behind = found or (self._suggested(trials), 0)
                 marks = {HOLDER: holder} | ({} if promise is None else {PROMISE: promise})
+                marks |= {BEHIND: behind} if behind else {}
                 trial = self._ledger.store(TrialState.RUNNING, parameters, marks)
             return self._asked(trial, False)
 
@@ -226,7 +237,7 @@ class RobotStudy:
         id: int,
         value: Any = None,
         *,
-        failed: bool = False,
+        failed: bool | Literal["rig"] = False,
         reached: Mapping[str, Any] | None = None,
         constraints: Mapping[str, Any] | None = None,
         contacts: Mapping[str, Any] | None = None,
@@ -242,7 +253,8 @@ class RobotStudy:
         value
             Finite; larger is better. Of a study about success: "success" or "failure", True or False, or "7/10".
         failed
-            Whether the trial gave nothing; then there is no value.
+            True: the trial gave nothing, and has no value. "rig": the place is not at fault; nothing is learnt, and the
+            trial is handed out again, to whoever asks first.
         reached
             The parameters that were truly reached, all of them or those that differ; they may lie outside the ranges.
         constraints
@@ -260,7 +272,12 @@ class RobotStudy:
             If there is no such trial, contacts are refused, the value or what was reached is not finite, successes are
             no count or come with a value, or the trial was told something else before. What was told before stays.
         """
+        if failed not in (False, True, "rig"):
+            raise unknown_name("kind of failure", failed, ("True", "rig"))
         with self.storage.failures():
+            if failed == "rig":
+                checked_value(value, failed=True)
+                return self._ledger.let_go(id)
             if contacts is not None:
                 if self._touched is None:
                     raise InputError(
@@ -268,9 +285,9 @@ class RobotStudy:
                         "with: surehold explore --box x,y,z --study NAME."
                     )
                 contacts = self._touched.checked(contacts, self._ledger.trials())
-            outputs = self._checked(constraints, failed)
+            outputs = self._checked(constraints, bool(failed))
             share, executions = answer(self.settings.optimizer, value, successes, of)
-            return self._ledger.tell(id, share, failed, reached, outputs, contacts, executions)
+            return self._ledger.tell(id, share, bool(failed), reached, outputs, contacts, executions)
 
     def _checked(self, constraints: Mapping[str, Any] | None, failed: bool) -> dict[str, float]:
         values = checked_outputs(self.limits, constraints, failed)
@@ -392,7 +409,7 @@ class RobotStudy:
     def _promise(self, trials: list[FrozenTrial]) -> float | None:
         if self._touched is not None:
             return None
-        history = history_of(trials, self.settings.space, outputs=self.sampler.outputs)
+        history = self.sampler.history(trials, self.settings.space)
         if len(trials) < self.n_initial or not np.isfinite(history.y).any():
             return None
         with self.sampler.optimizing(self.settings.space, history, self.settings.direction) as optimizer:
@@ -401,4 +418,4 @@ class RobotStudy:
     def _asked(self, trial: FrozenTrial, again: bool) -> Asked:
         parameters = {name: trial.params[name] for name in self.settings.space.distributions}
         pose = None if self._touched is None else self._touched.pose(parameters)
-        return Asked(trial.number, parameters, dict(self.settings.units), again, pose)
+        return Asked(trial.number, parameters, dict(self.settings.units), again, pose, trial.user_attrs.get(BEHIND, 0))

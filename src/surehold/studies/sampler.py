@@ -6,7 +6,7 @@ that could change it, so a study can be interrupted, resumed and shared by any n
 
 import threading
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -18,14 +18,14 @@ from optuna.search_space import IntersectionSearchSpace
 from optuna.study import Study, StudyDirection
 from optuna.trial import FrozenTrial
 
-from surehold.defaults import MANY
+from surehold.defaults import MANY, SUCCESS_PLACES
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.protocol import Surrogate
 from surehold.studies.allowed import allowed_in
-from surehold.studies.history import History, history_of
+from surehold.studies.history import History, Reader
 from surehold.studies.search_space import SearchSpace
 
 __all__ = ["Sampler"]
@@ -50,14 +50,15 @@ class Sampler(BaseSampler):
         Non-negative integer.
     surrogate
         As in `Optimizer`, whose default None stands for. It carries tens of thousands of trials: from
-        `surehold.defaults.MANY` on a place is judged by the trials near it, which is said once.
+        `surehold.defaults.MANY` on a place is judged by the trials near it (of successes, from `SUCCESS_PLACES` on near
+        ones count together), which is said once.
     warn_independent_sampling
         Whether to warn when a parameter is drawn at random because it is not in the search space.
     **settings
         Of `Optimizer`: criterion, n_initial, design, noise, output_range, quadrature, k, border, kappa, risk, preset,
-        allowed, constraints, feasible. A function `allowed` takes the parameters {name: value}. The further outputs of
-        a trial are its attributes of that name: `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets
-        start anew for every suggestion.
+        allowed, constraints, feasible, safety, failures, initial_points, outcome. A function `allowed` takes the
+        parameters {name: value}. The further outputs of a trial are its attributes of that name:
+        `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets start anew for every suggestion.
 
     The direction of the study decides whether values are maximized or minimized; several objectives are refused.
 
@@ -89,6 +90,8 @@ class Sampler(BaseSampler):
     ):
         if "direction" in settings:
             raise InputError("a sampler has no direction of its own; say optuna.create_study(direction=...).")
+        if settings.get("outcome") == "preference":
+            raise InputError("a study keeps no preferences; make a surehold.Optimizer, and tell_preference(...).")
         if search_space is None or isinstance(search_space, SearchSpace):
             self._space = search_space
         else:
@@ -100,10 +103,11 @@ class Sampler(BaseSampler):
         self._warn = warn_independent_sampling
         self._common = IntersectionSearchSpace()
         self._kept: tuple[tuple[Any, ...], Optimizer] | None = None  # saves time, changes nothing
+        self._reader: tuple[dict[str, BaseDistribution], Reader] | None = None  # as well
         self._lock = threading.RLock()
         # What is wrong is told now, not at the first trial.
         if self._space is None:
-            anything = InputNoise.unit(0.1) if input_noise is not None else None
+            anything = None if checked_input_noise(input_noise, ("x",)) is None else InputNoise.unit(0.1)
             Optimizer(Box.unit(1), input_noise=anything, **self._settings)
         elif self._space.box is not None:
             self._new_optimizer(self._space, "maximize")
@@ -154,8 +158,15 @@ class Sampler(BaseSampler):
         space = space or self._known_space()
         if space.box is None:
             return space.complete({})
-        with self.optimizing(space, history_of(trials, space, number, self.outputs), direction) as optimizer:
+        with self.optimizing(space, self.history(trials, space, number), direction) as optimizer:
             return space.complete(optimizer.ask_trial(number=number).parameters)
+
+    def history(self, trials: Iterable[FrozenTrial], space: SearchSpace, number: int | None = None) -> History:
+        """Return what all trials of a study say, as `history_of` does; only new ones are read."""
+        with self._lock:
+            if self._reader is None or self._reader[0] != space.distributions:
+                self._reader = (space.distributions, Reader(space, self.outputs))
+            return self._reader[1].read(trials, number)
 
     def optimizer(self, study: Study) -> Optimizer:
         """Return a new optimizer that has been told the study's trials.
@@ -166,7 +177,7 @@ class Sampler(BaseSampler):
             If the study has several objectives, or no parameter can vary.
         """
         space = self.search_space(study)
-        history = history_of(study.get_trials(deepcopy=False), space, outputs=self.outputs)
+        history = self.history(study.get_trials(deepcopy=False), space)
         optimizer = self._new_optimizer(space, direction_of(study))
         optimizer.restore(
             history.X,
@@ -195,8 +206,10 @@ class Sampler(BaseSampler):
 
     def n_initial(self, space: SearchSpace) -> int:
         """Return the size of the initial design in a search space."""
-        given = self._settings.get("n_initial")
-        return Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given
+        given, first = self._settings.get("n_initial"), len(self._settings.get("initial_points") or ())
+        if self._settings.get("safety") is not None:
+            return first
+        return max(Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given, first)
 
     @contextmanager
     def optimizing(self, space: SearchSpace, history: History, direction: str) -> Iterator[Optimizer]:
@@ -211,10 +224,11 @@ class Sampler(BaseSampler):
             key = (tuple(space.distributions.items()), direction)
             if self._kept is None or self._kept[0] != key:
                 self._kept = (key, self._new_optimizer(space, direction))
-            if len(history.y) > MANY and not self._said:
-                self._said = True
-                _log.warning(f"The study has more than {MANY} trials: a place is judged by those near it from now on.")
             optimizer = self._kept[1]
+            many = SUCCESS_PLACES if optimizer.outcome == "success" else MANY
+            if len(history.y) > many and not self._said:
+                self._said = True
+                _log.warning(f"The study has more than {many} trials: a place is judged by those near it from now on.")
             optimizer.restore(
                 history.X,
                 history.y,
@@ -243,7 +257,7 @@ class Sampler(BaseSampler):
         return Optimizer(space.box, input_noise=self._input_noise, **settings)
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_kept": None, "_lock": None}
+        return self.__dict__ | {"_kept": None, "_reader": None, "_lock": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state | {"_lock": threading.RLock()})

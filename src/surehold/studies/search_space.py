@@ -5,7 +5,7 @@ Parameters that can take one value only are left out of the box; what the others
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -62,7 +62,7 @@ class SearchSpace:
         varying = {name: variable for name, variable in self._variables.items() if name not in self.fixed}
         self.box: Final = Box(varying) if varying else None
 
-    def encode_all(self, rows: list[Mapping[str, Any]], *, anywhere: bool = False) -> NDArray[np.float64]:
+    def encode_all(self, rows: Sequence[Mapping[str, Any]], *, anywhere: bool = False) -> NDArray[np.float64]:
         """Return the points (n, d) of the box for n sets of parameters; `anywhere`: numbers may lie outside of it."""
         if self.box is None:
             return np.zeros((len(rows), 0))

@@ -8,8 +8,8 @@ import html
 import secrets
 import socket
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from typing import Annotated, Any, Final
 
 from fastapi import Depends, FastAPI, HTTPException, Path, Request
@@ -21,6 +21,7 @@ from surehold import __version__
 from surehold.errors import InputError, SureholdError
 from surehold.studies import service_messages as wire
 from surehold.studies.ledger import AnswerRefused, UnknownTrial
+from surehold.studies.prepared import Prepared
 from surehold.studies.robot import NothingToAsk, RobotStudy
 from surehold.studies.service_guard import PATIENCE, Guard, Impatience
 from surehold.studies.status import rows, status
@@ -93,6 +94,13 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
         if name != study.name:
             raise HTTPException(404, f"study {name[:100]!r} is not served here; this is '{study.name}'.")
 
+    prepared = Prepared(study)
+
+    @asynccontextmanager
+    async def life(_: FastAPI) -> AsyncIterator[None]:
+        yield
+        prepared.close()
+
     problems: dict[int | str, dict[str, Any]] = {
         code: {"model": wire.Problem} for code in (400, 401, 404, 408, 409, 413, 422, 503)
     }
@@ -104,6 +112,7 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
         redoc_url=None,
         redirect_slashes=False,
         responses=problems,
+        lifespan=life,
     )
     app.add_middleware(Guard, token=token, patience=patience)
     _say_what_is_wrong(app)
@@ -126,11 +135,8 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
 
     @app.post("/studies/{name}/ask", **protected)
     def ask(question: wire.Question) -> wire.AskedTrial:
-        """Hand out the next trial."""
-        asked = study.ask(question.worker)
-        return wire.AskedTrial(
-            id=asked.id, parameters=asked.parameters, units=asked.units, again=asked.again, pose=asked.pose
-        )
+        """Hand out the next trial; where asks overlap, one that was prepared ahead."""
+        return wire.AskedTrial(**vars(prepared.ask(question.worker)))
 
     @app.post("/studies/{name}/tell", **protected)
     def tell(answer: wire.Answer) -> wire.Taken:

@@ -73,7 +73,9 @@ class Answer(_Request):
 
     id: _Id
     value: _Value = None
-    failed: bool = False
+    failed: Annotated[bool | Literal["rig"], Field(description='"rig": not the place failed; it is asked again.')] = (
+        False
+    )
     reached: Annotated[_Parameters | None, Field(description="What was truly reached, where it differs.")] = None
     constraints: _Outputs = None
     successes: _Count = None
@@ -114,6 +116,7 @@ class AskedTrial(BaseModel):
     units: dict[str, str]
     again: bool
     pose: dict[str, Any] | None = None
+    behind: Annotated[int, Field(description="Told answers that its model did not know; 0 unless asks overlap.")] = 0
 
 
 class Taken(BaseModel):

@@ -49,7 +49,7 @@ class StopRule:
         if self.trials is not None and trials >= self.trials:
             return f"the budget of {self.trials} trials is used up"
         if self.until is not None and now >= self.until:
-            return f"its time ended at {datetime.fromtimestamp(self.until, UTC).isoformat(timespec='seconds')}"
+            return f"its time ended at {_moment(self.until)}"
         last = promises[-self.asks :]
         if self.improvement is not None and len(last) == self.asks and max(last) < self.improvement:
             return (
@@ -57,6 +57,19 @@ class StopRule:
                 f"(the largest: {max(last):.3g})"
             )
         return ""
+
+    def __str__(self) -> str:
+        """Return in words when asking ends."""
+        parts = [
+            *([f"after {self.trials} trials in all"] if self.trials is not None else []),
+            *([f"at {_moment(self.until)}"] if self.until is not None else []),
+            *(
+                [f"when {self.asks} trials in a row promise less than {self.improvement:g}"]
+                if self.improvement is not None
+                else []
+            ),
+        ]
+        return f"ends {', or '.join(parts)}" if parts else "never ends by itself"
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -74,3 +87,7 @@ def _whole(value: Any, least: int) -> bool:
 
 def _number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value)
+
+
+def _moment(seconds: float) -> str:
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")

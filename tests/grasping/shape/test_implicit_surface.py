@@ -123,6 +123,20 @@ def test_a_bound_acts_only_where_it_is_broken():
     assert bound.value(inside[:, :3])[0] == pytest.approx(0.002, abs=0.001)
 
 
+def test_a_surface_with_active_bounds_is_that_of_all_its_observations_at_once():
+    told = sphere(30, slopes=12)
+    inside = np.array([[0.0, 0.0, 0.0, 0.002], [0.02, 0.01, 0.0, 0.001]])
+    bound = surface_of(PRIOR, told + Observations(free=inside), 0.01, 0.03)
+    assert len(bound.observations.points) > 30
+    once = surface_of(PRIOR, bound.observations, 0.01, 0.03)
+    x = np.random.default_rng(5).uniform(-0.06, 0.06, (40, 3))
+    assert bound.value(x) == pytest.approx(once.value(x), abs=1e-9)
+    assert bound.deviation(x) == pytest.approx(once.deviation(x), abs=1e-8)
+    columns = np.random.default_rng(6).standard_normal((len(once.factor), 2))
+    for mine, theirs in zip(bound.solved(columns), once.solved(columns), strict=True):
+        assert mine == pytest.approx(theirs, rel=1e-6, abs=1e-6 * np.abs(theirs).max())
+
+
 def test_contradictory_contacts_are_averaged_not_refused():
     x = np.array([[0.05, 0.0, 0.0], [0.05, 0.0, 0.0]])
     told = Observations(x, np.array([0.0, 0.004]), np.full(2, 5e-4))

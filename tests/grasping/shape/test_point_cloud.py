@@ -118,8 +118,25 @@ def test_a_camera_among_the_points_is_refused(mug):
         cleaned(mug, camera=mug.mean(axis=0))
 
 
-def test_millions_of_points_are_read_in_part():
-    many = surface_points(shipped_object("mug"), 1_000_000, np.random.default_rng(4))[0]
+def test_ten_million_points_are_thinned_before_anything_else():
+    rng = np.random.default_rng(4)
+    places = surface_points(shipped_object("mug"), 400_000, rng)[0].astype(np.float32)
+    many = np.repeat(places, 25, axis=0)
+    many += rng.normal(0.0, 0.0005, many.shape).astype(np.float32)
+    many[:20_000] = rng.uniform(-0.3, 0.3, (20_000, 3))  # single points in the air
     cloud = cleaned(many)
-    assert any("each 17th was taken" in note for note in cloud.notes)
+    assert cloud.notes[0].startswith("of 10,000,000 points ")
     assert len(cloud.points) <= 2500
+    off = np.abs(distance_field_of(shipped_object("mug")).distance(cloud.points))
+    assert np.quantile(off, 0.99) < 0.002
+    assert off.mean() < 0.0006
+
+
+def test_of_many_points_those_of_a_small_part_are_not_lost():
+    rng = np.random.default_rng(6)
+    part = surface_points(shipped_object("mug"), 3_000, rng)[0]
+    dense = np.column_stack([rng.uniform(-0.3, 0.3, (400_000, 2)), rng.normal(0.0, 0.0003, 400_000)])
+    cloud = cleaned(np.vstack([dense, part]), camera=CAMERA)
+    assert cloud.table is not None
+    assert len(cloud.points) > 1500
+    assert np.ptp(cloud.points, axis=0) == pytest.approx(np.ptp(part, axis=0), abs=0.01)

@@ -4,10 +4,12 @@ from scipy.optimize import check_grad
 from scipy.special import log_ndtr, ndtr
 
 from surehold.optimization.box import Box
-from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel, propagate
+from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.surrogates.success import model
+from surehold.optimization.surrogates.success.propagation import propagated
 
 RNG = np.random.default_rng(0)
 X = RNG.random((24, 2))
@@ -30,11 +32,10 @@ def test_probability_and_evidence_against_sampling_the_exact_posterior(n, s2):
     f = np.random.default_rng(1).multivariate_normal(np.zeros(n + 3), joint, 400_000)
     weights = np.exp(log_ndtr(t * f[:, :n]).sum(axis=1))
     expected = (weights[:, None] * ndtr(f[:, n:])).sum(axis=0) / weights.sum()
-    sites = propagate(joint[:n, :n], t)
+    sites = propagated(joint[:n, :n], OK[:n].astype(float), np.ones(n), np.full(n, 1e-6), np.zeros(n))
     k = joint[n:, :n]
-    S = np.diag(np.maximum(sites.root, 1e-9) ** -2.0)
-    v = s2 + 1.0 - np.einsum("qi,ij,qj->q", k, np.linalg.inv(joint[:n, :n] + S), k)
-    assert ndtr(k @ sites.a / np.sqrt(1.0 + v)) == pytest.approx(expected, abs=0.01)
+    v = s2 + 1.0 - np.square(k @ sites.half.T).sum(axis=1)
+    assert ndtr(k @ sites.alpha / np.sqrt(1.0 + v)) == pytest.approx(expected, abs=0.01)
     assert sites.log_evidence == pytest.approx(np.log(weights.mean()), abs=0.05)  # EP: 0.024 off
 
 
@@ -68,6 +69,20 @@ def test_what_is_said_to_be_likely_is_so_at_least_as_often():
     assert true[low].mean() < p[low].mean() + 0.02
     assert true[high].mean() > p[high].mean() - 0.02
     assert true[~low & ~high].mean() == pytest.approx(0.5, abs=0.2)
+
+
+@pytest.mark.parametrize(("places", "times"), [(30, 6), (130, 1)])
+def test_repeated_and_many_trials_have_an_edge_as_single_ones(places, times, monkeypatch):
+    """Several trials at one place, told apart or put together, beside an edge as sharp as the model knows."""
+    monkeypatch.setattr(model, "SUCCESS_PLACES", 100)
+    rng = np.random.default_rng(0)
+    points = rng.random((places, 2))
+    points = points[np.abs(points @ [1.0, 0.4] - 0.8) > 0.05]
+    fine = points @ [1.0, 0.4] < 0.8
+    P, slopes = SuccessModel(np.repeat(points, times, axis=0), np.repeat(fine, times)).probability(points, True)
+    assert P[fine].min() > 0.8
+    assert P[~fine].max() < 0.2
+    assert np.isfinite(slopes).all()
 
 
 def run(n, seed, fails, **settings):

@@ -1,5 +1,7 @@
 """Ranking against the model's outcomes at every point of a fine grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -106,3 +108,18 @@ def test_history():
     history = History(TRIED, f(TRIED), np.zeros((3, 1)), np.zeros((2, 1)))
     assert history.told == 28
     assert history.spread == pytest.approx(np.mean(np.abs(f(TRIED) - np.mean(f(TRIED)))))
+
+
+def test_what_was_ranked_is_ranked_again_only_for_other_trials_or_another_model(posterior):
+    ranking = ranking_of()
+    first = ranking.incumbent(posterior, HISTORY, "robust")[1]
+    assert np.array_equal(ranking.incumbent(posterior, HISTORY, "robust")[1], first)
+    fewer = HISTORY._replace(tried=TRIED[:5], observed=f(TRIED[:5]))
+    assert set(ranking.incumbent(posterior, fewer, "robust")[1].ravel()) <= set(TRIED[:5].ravel())
+    upside_down = GaussianProcess().fit(TRIED, -f(TRIED)).posterior
+    other = ranking.trials(upside_down, HISTORY, False)
+    assert np.array_equal(other, ranking_of().trials(upside_down, HISTORY, False))
+    assert other[0] != ranking.trials(posterior, HISTORY, False)[0]
+    averse = replace(ranking, risk=Risk("worst"))
+    assert np.array_equal(averse.trials(posterior, HISTORY, False), averse.order(posterior, TRIED))
+    assert not np.array_equal(averse.order(posterior, TRIED), ranking.order(posterior, TRIED))

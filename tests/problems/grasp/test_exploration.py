@@ -9,7 +9,7 @@ from surehold.errors import InputError
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.poses import Pose
 from surehold.grasping.simulator import Simulator
-from surehold.problems.grasp.exploration import Exploration, belief_of_box
+from surehold.problems.grasp.exploration import Exploration, belief_of_box, belief_of_size
 from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.grasp.shape_loss import shape_loss
 from surehold.problems.grasp.told_contacts import contacts_of_file
@@ -55,6 +55,24 @@ def test_the_surface_moves_to_what_was_felt(explored):
     assert np.abs(run.belief.surface.value(points)).mean() < 0.0015
     assert np.abs(run.belief.surface.value(points)).mean() < 0.3 * np.abs(before.value(points)).mean()
     assert np.all(run.belief.surface.deviation(points) < 0.3 * before.std)
+
+
+def test_a_large_box_costs_no_more_than_a_small_one():
+    large = belief_of_size([0.9, 0.7, 0.4])
+    assert np.prod(large.grid.shape) < 1.3 * 100_000  # numbers of nodes are rounded up
+    assert large.grid.cell > belief_of_size([0.06, 0.06, 0.1]).grid.cell == 0.004
+
+
+def test_space_that_is_swept_again_and_again_is_kept_once(explored):
+    run, touches = explored
+    again = Exploration(PROBLEM, belief_of_box(BOTTLE, cell=0.006), NOISE, shapes=2, seed=1)
+    swept = touches[0].observations
+    for _ in range(3):
+        again.tell(run.X[0], 0.0, swept)
+    once = Exploration(PROBLEM, belief_of_box(BOTTLE, cell=0.006), NOISE, shapes=2, seed=1)
+    once.tell(run.X[0], 0.0, swept)
+    assert len(swept.free) > 0
+    assert np.array_equal(again.belief.free, once.belief.free)
 
 
 def test_the_next_trial_follows_from_what_was_told(explored):

@@ -46,15 +46,16 @@ class Closed(NamedTuple):
 
 
 @njit(cache=True)
-def _link_at(f, k, t, bases, chains, motion, stop, ends):
-    """Write the ends (2, 3) of link k of finger f at time t; motion is (4, f, j): start, rate, lower, upper."""
-    q = np.empty(k + 1)
-    frames = np.empty((k + 1, 3, 4))
+def _link_at(f, k, t, bases, chains, motion, stop, ends, q, frames):
+    """Write the ends (1, 2, 3) of link k of finger f at time t; motion is (4, f, j): start, rate, lower, upper.
+
+    `q` (j,) and `frames` (j, 3, 4) are overwritten: to ask for memory at every look would take as long as the look.
+    """
     for j in range(k + 1):
         angle = motion[0, f, j] + motion[1, f, j] * min(t, stop[f, j])
         q[j] = min(max(angle, motion[2, f, j]), motion[3, f, j])
     finger_frames(bases[f], chains[f, : k + 1], q, frames)
-    axis_ends(frames[k:], chains[f, k : k + 1], ends.reshape(1, 2, 3))
+    axis_ends(frames[k : k + 1], chains[f, k : k + 1], ends)
 
 
 @njit(cache=True)
@@ -84,32 +85,32 @@ def _begins(f, k, motion, stop):
 
 
 @njit(cache=True)
-def _gap_at(f, k, t, nodes, frame, bases, chains, motion, stop, radius, ends):
+def _gap_at(f, k, t, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames):
     """Return the gap between link k of finger f and the object at time t [m]."""
-    _link_at(f, k, t, bases, chains, motion, stop, ends)
-    return capsule_gap(nodes, frame, ends[0], ends[1], radius, 1e-6, 0.0)[0]
+    _link_at(f, k, t, bases, chains, motion, stop, ends, q, frames)
+    return capsule_gap(nodes, frame, ends[0, 0], ends[0, 1], radius, 1e-6, 0.0)[0]
 
 
 @njit(cache=True)
-def _closest(f, k, early, late, nodes, frame, bases, chains, motion, stop, radius, ends):
+def _closest(f, k, early, late, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames):
     """Return time and gap of the closest approach between two times; an infinite gap if it is at one of them."""
     share = 0.5 * (np.sqrt(5.0) - 1.0)  # golden section
     a, b = early, late
     c, d = b - share * (b - a), a + share * (b - a)
-    gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends)
-    gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends)
+    gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
+    gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
     for _ in range(22):  # to 3e-5 of the interval
         if gc < gd:
             b, d, gd = d, c, gc
             c = b - share * (b - a)
-            gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends)
+            gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
         else:
             a, c, gc = c, d, gd
             d = a + share * (b - a)
-            gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends)
+            gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
     t, gap = (c, gc) if gc < gd else (d, gd)
-    first = _gap_at(f, k, early, nodes, frame, bases, chains, motion, stop, radius, ends)
-    last = _gap_at(f, k, late, nodes, frame, bases, chains, motion, stop, radius, ends)
+    first = _gap_at(f, k, early, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
+    last = _gap_at(f, k, late, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
     return t, (gap if gap < min(first, last) else np.inf)
 
 
@@ -185,8 +186,8 @@ def close_hand(
     fingers, per_finger = radii.shape
     links = fingers * per_finger
     touched = np.zeros(links, dtype=np.bool_)
-    mine = np.empty((2, 3))
-    other = np.empty((2, 3))
+    mine, other = np.empty((1, 2, 3)), np.empty((1, 2, 3))
+    q, frames = np.empty(per_finger), np.empty((per_finger, 3, 4))
 
     # The gaps to watch: link - object, link - palm, link - link of another finger.
     most = links * (1 + palms.shape[0]) + links * links // 2
@@ -240,21 +241,23 @@ def close_hand(
             continue
         looks += 1
         radius = radii[fa, ka]
-        _link_at(fa, ka, t, bases, chains, motion, stop, mine)
+        _link_at(fa, ka, t, bases, chains, motion, stop, mine, q, frames)
         if b == -1:
-            gap = capsule_gap(nodes, frame, mine[0], mine[1], radius, 0.2 * TOUCH, 0.2)[0]
+            gap = capsule_gap(nodes, frame, mine[0, 0], mine[0, 1], radius, 0.2 * TOUCH, 0.2)[0]
             if gap < 2.0 * brush:  # a gap that is underrated now and then hides the closest approach
-                gap = capsule_gap(nodes, frame, mine[0], mine[1], radius, 0.2 * TOUCH, 0.0)[0]
+                gap = capsule_gap(nodes, frame, mine[0, 0], mine[0, 1], radius, 0.2 * TOUCH, 0.0)[0]
         elif b < -1:
-            gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[0], mine[1], radius)
+            gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[0, 0], mine[0, 1], radius)
         else:
             fb, kb = b // per_finger, b % per_finger
-            _link_at(fb, kb, t, bases, chains, motion, stop, other)
-            gap = capsule_pair_gap(mine[0], mine[1], other[0], other[1], radius + radii[fb, kb])
+            _link_at(fb, kb, t, bases, chains, motion, stop, other, q, frames)
+            gap = capsule_pair_gap(mine[0, 0], mine[0, 1], other[0, 0], other[0, 1], radius + radii[fb, kb])
         if b == -1 and brush > 0.0:
             pass_leave[a] = max(pass_leave[a], gap)
             if looked[a, 0] < 1.5 * brush and looked[a, 0] <= looked[a, 1] and looked[a, 0] < gap:
-                when, near = _closest(fa, ka, times[a, 1], t, nodes, frame, bases, chains, motion, stop, radius, other)
+                when, near = _closest(
+                    fa, ka, times[a, 1], t, nodes, frame, bases, chains, motion, stop, radius, other, q, frames
+                )
                 if near < min(brush, pass_gap[a]):
                     pass_time[a], pass_gap[a], pass_leave[a] = when, near, gap
             looked[a, 1], times[a, 1] = looked[a, 0], times[a, 0]

@@ -1,6 +1,7 @@
 """The description of a hand beside its model: a short YAML file.
 
     name: my-hand
+    model: {file: my_hand.xml}     # optional: the model, seen from this file's folder; then this file alone is a hand
     palm:
       body: palm_link              # the body that everything is measured from
       origin: [0, 0, 0]            # of the palm frame, in that body's frame [m]
@@ -33,7 +34,16 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 from surehold.errors import InputError
 from surehold.grasping.plain_data import plain_yaml
 
-__all__ = ["Coupling", "HandConfig", "PackagedModel", "PalmConfig", "Posture", "PreshapeConfig", "read_hand_config"]
+__all__ = [
+    "Coupling",
+    "HandConfig",
+    "ModelFile",
+    "PackagedModel",
+    "PalmConfig",
+    "Posture",
+    "PreshapeConfig",
+    "read_hand_config",
+]
 
 Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 Joints = dict[str, FiniteFloat]
@@ -49,6 +59,12 @@ class PackagedModel(_Strict):
     package: str
     distribution: str
     path: str
+
+
+class ModelFile(_Strict):
+    """Where a description finds its model: a path seen from the description's own folder."""
+
+    file: Annotated[str, Field(min_length=1)]
 
 
 class PalmConfig(_Strict):
@@ -102,7 +118,7 @@ class HandConfig(_Strict):
     friction: Annotated[FiniteFloat, Field(gt=0.0, le=10.0)] | None = None
     sources: dict[Literal["finger_force", "friction"], Annotated[str, Field(max_length=200)]] = {}
     preshapes: Annotated[dict[str, PreshapeConfig], Field(min_length=1)]
-    model: PackagedModel | None = None
+    model: PackagedModel | ModelFile | None = None
 
 
 def read_hand_config(path: str | Path) -> HandConfig:

@@ -68,6 +68,10 @@ class JointCouplings:
             leaders |= {j for j in range(self._model.njnt) if self._rest.moves(j)}
         return {self._rest.joint_names[j] for j in leaders}
 
+    def followers(self) -> set[str]:
+        """Return the joints that follow others whatever is named, unless they are named themselves."""
+        return {self._rest.joint_names[j] for j in self._equal | self._described}
+
     def posture(self, named: Mapping[str, float], start: Array, what: str) -> Array:
         """Return all joints (j,): those named, those that follow them, the others where they `start` (j,).
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from surehold.errors import InputError
 from surehold.grasping.hand.building import built_hand
-from surehold.grasping.hand.configuration import HandConfig, read_hand_config
+from surehold.grasping.hand.configuration import HandConfig, ModelFile, read_hand_config
 from surehold.grasping.hand.model import Hand
 from surehold.grasping.hand.rest import RestingModel
 from surehold.grasping.hand.urdf import read_urdf
@@ -64,17 +64,19 @@ def read_model(model: str | Path) -> tuple[Any, Any]:
 
 
 def packaged_hand(config: str | Path) -> Hand:
-    """Return the hand of a description that names an installed package's model.
+    """Return the hand of a description that names its model: a file, or one of an installed package.
 
     Raises
     ------
     InputError
-        If the package is not installed; nothing is ever downloaded.
+        As `load_hand`, or if the package is not installed; nothing is ever downloaded.
     """
     described = read_hand_config(config)
     where = described.model
     if where is None:
         raise InputError(f"{str(config)!r} does not say where its model is; give --hand MODEL beside --hand-config.")
+    if isinstance(where, ModelFile):
+        return load_hand(Path(config).parent / where.file, described)
     found = importlib.util.find_spec(where.package)
     folders = [] if found is None else list(found.submodule_search_locations or [])
     for folder in folders:

@@ -12,7 +12,7 @@ from surehold.grasping.hand.synergy import closing_motion
 from surehold.grasping.poses import Pose
 from surehold.grasping.simulator import Simulator
 
-__all__ = ["Scene", "SceneMesh", "grasp_scene"]
+__all__ = ["Scene", "SceneMesh", "capsule_mesh", "grasp_scene", "hand_meshes"]
 
 _AROUND = 24  #: corners around a link
 _CAP = 6  #: rings on each round end of a link
@@ -101,7 +101,7 @@ def hand_meshes(hand: Hand, pose: Pose, steps: NDArray[np.float64]) -> list[Scen
     rows = hand.chains.reshape(-1, hand.chains.shape[2])
     for body, (name, row, radius) in enumerate(zip(hand.link_names, rows, hand.radii.ravel(), strict=True)):
         if radius > 0.0:
-            vertices, faces = _capsule(row[1:4], row[4:7], float(radius))
+            vertices, faces = capsule_mesh(row[1:4], row[4:7], float(radius))
             bodies.append(SceneMesh(name, vertices.astype(np.float32), faces, frames[:, body]))
     return bodies
 
@@ -121,9 +121,10 @@ def _shown(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[NDA
     return vertices.astype(np.float32), faces.astype(np.int32)
 
 
-def _capsule(
+def capsule_mesh(
     near: NDArray[np.float64], far: NDArray[np.float64], radius: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Return vertices (v, 3) and faces (f, 3) of a capsule whose axis ends at `near` and `far` (3,)."""
     length = float(np.linalg.norm(far - near))
     axis = (far - near) / length
     helper = np.eye(3)[np.argmin(np.abs(axis))]

@@ -23,7 +23,7 @@ from surehold.errors import InputError
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.shape.implicit_surface import ImplicitSurface
 from surehold.grasping.shape.kernel import fast_function_values
-from surehold.grasping.shape.level_set import Grid, distances_of, grid_around, level_set_mesh, one_piece
+from surehold.grasping.shape.level_set import MOST_NODES, Grid, distances_of, grid_around, level_set_mesh, one_piece
 
 __all__ = ["DENSITY", "ShapeBelief", "grid_of"]
 
@@ -109,8 +109,11 @@ class ShapeBelief:
         return replace(self, surface=surface, free=self.free if free is None else np.vstack([self.free, free]))
 
 
-def grid_of(surface: ImplicitSurface, cell: float, reach: float = REACH, growth: float = 2.0) -> Grid:
-    """Return a grid around what the surface may be: its prior shape and points, `growth` deviations larger."""
+def grid_of(surface: ImplicitSurface, cell: float, growth: float = 2.0, most: int = MOST_NODES) -> Grid:
+    """Return a grid around what the surface may be: its prior shape and points, `growth` deviations larger.
+
+    Its cells are larger than `cell` [m] if it had more than `most` nodes.
+    """
     corners = surface.first.half * np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
     placed = surface.first.center + corners @ surface.first.axes.T
     lower, upper = placed.min(axis=0), placed.max(axis=0)
@@ -121,7 +124,7 @@ def grid_of(surface: ImplicitSurface, cell: float, reach: float = REACH, growth:
         upper = np.maximum(upper + spread, on_surface.max(axis=0))
     else:
         lower, upper = lower - spread, upper + spread
-    return grid_around(lower, upper, cell, reach + 2.0 * cell)
+    return grid_around(lower, upper, cell, REACH + 2.0 * cell, most)
 
 
 def _lift(values: Array, grid: Grid, free: Array) -> None:

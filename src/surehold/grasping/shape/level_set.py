@@ -21,11 +21,11 @@ from surehold.errors import SureholdError
 from surehold.grasping.object.distance_field import DistanceField
 from surehold.store.kernels import njit
 
-__all__ = ["Grid", "distances_of", "grid_around", "level_set_mesh", "one_piece"]
+__all__ = ["MOST_NODES", "Grid", "distances_of", "grid_around", "level_set_mesh", "one_piece"]
 
 Array = NDArray[np.float64]
 
-_MOST_NODES: Final = 1_500_000
+MOST_NODES: Final = 1_500_000  #: of a grid
 _MEASURED: Final = 0.02  # of the measured points, of a part that is no mistake
 
 
@@ -48,13 +48,13 @@ class Grid:
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def grid_around(lower: Array, upper: Array, cell: float, margin: float) -> Grid:
-    """Return the grid of that cell that reaches `margin` beyond a box; a coarser one if it had too many nodes.
+def grid_around(lower: Array, upper: Array, cell: float, margin: float, most: int = MOST_NODES) -> Grid:
+    """Return the grid of that cell that reaches `margin` beyond a box; a coarser one if it had more than `most` nodes.
 
     Its numbers of nodes are odd, so that every second node is a grid of its own.
     """
     size = upper - lower + 2.0 * margin
-    cell = max(cell, float(np.cbrt(np.prod(size) / _MOST_NODES)))
+    cell = max(cell, float(np.cbrt(np.prod(size) / most)))
     shape = 2 * np.ceil(0.5 * size / cell).astype(int) + 1
     return Grid(lower - margin, cell, (int(shape[0]), int(shape[1]), int(shape[2])))
 

@@ -32,6 +32,8 @@ __all__ = [
 
 Convention = Literal["normal_unit", "unit_magnitude"]
 CONVENTIONS = ("normal_unit", "unit_magnitude")
+_MOST_EDGES = 1000
+_LARGEST = 1e12  # what is computed with larger lengths and coefficients overflows, or divides by 0
 
 # The tangent field below is singular at -_POLE alone. The pole is in general position: faces, chamfers at 45 degrees
 # and barrels of objects modeled along their axes keep clear of it.
@@ -86,8 +88,10 @@ class CheckedContacts(NamedTuple):
         mu = _coefficients("friction", friction, c)
         gamma = _coefficients("torsion", torsion, c)
         o = finite_array("origin", origin, (3,))
-        if not (isinstance(torque_length, (int, float)) and np.isfinite(torque_length) and torque_length > 0.0):
-            raise InputError(f"torque_length must be a finite length above 0 [m], not {torque_length!r}.")
+        if not (isinstance(torque_length, (int, float)) and 1.0 / _LARGEST <= torque_length <= _LARGEST):
+            raise InputError(
+                f"torque_length must be a length from {1.0 / _LARGEST:g} to {_LARGEST:g} m, not {torque_length!r}."
+            )
         if convention not in CONVENTIONS:
             raise unknown_name("convention", convention, CONVENTIONS)
         if tangents is None:
@@ -142,8 +146,8 @@ def contact_wrenches(
 
 def cone_edges(contacts: CheckedContacts, edges: int) -> NDArray[np.float64]:
     """Return the wrenches of the cone edges of checked contacts, (m, 6); raise InputError for a bad number of edges."""
-    if isinstance(edges, bool) or not isinstance(edges, (int, np.integer)) or edges < 3:
-        raise InputError(f"edges must be an integer of at least 3, not {edges!r}; 8 is usual.")
+    if isinstance(edges, bool) or not isinstance(edges, (int, np.integer)) or not 3 <= edges <= _MOST_EDGES:
+        raise InputError(f"edges must be an integer from 3 to {_MOST_EDGES}, not {edges!r}; 8 is usual.")
     n, t, arms, mu, gamma, scale = contacts
     angles = 2.0 * np.pi * np.arange(edges) / edges
     b = _cross(n, t)
@@ -206,8 +210,10 @@ def finite_array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) ->
     wanted = a.shape[:1] + shape[1:] if shape[0] is None else shape
     if a.ndim != len(shape) or a.shape != wanted:
         raise InputError(f"{name} must have shape {_shape_text(shape)}, not {a.shape}.")
-    if not np.isfinite(a).all():
-        raise InputError(f"{name} must be finite, but holds NaN or infinity; check the contacts first.")
+    if not (np.abs(a) <= _LARGEST).all():
+        raise InputError(
+            f"{name} must be finite, but holds NaN, infinity or numbers beyond {_LARGEST:g}; check the contacts first."
+        )
     return a
 
 
@@ -218,8 +224,8 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
 def _coefficients(name: str, value: float | ArrayLike, c: int) -> NDArray[np.float64]:
     """Return coefficients of at least 0, one per contact, (c,)."""
     a = np.full(c, value, float) if isinstance(value, (int, float)) else finite_array(name, value, (c,))
-    if not np.all(np.isfinite(a) & (a >= 0.0)):
-        raise InputError(f"{name} must be finite and at least 0, not {value!r}.")
+    if not np.all((a >= 0.0) & (a <= _LARGEST)):
+        raise InputError(f"{name} must be at least 0 and at most {_LARGEST:g}, not {value!r}.")
     return a
 
 

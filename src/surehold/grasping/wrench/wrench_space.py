@@ -17,7 +17,7 @@ normals.
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,12 +27,19 @@ from surehold.grasping.choices import CONES
 from surehold.grasping.wrench.friction_cones import (
     CheckedContacts,
     Convention,
+    RoundContacts,
     cone_edges,
     contact_wrenches,
     round_contacts,
     tangents,
 )
-from surehold.grasping.wrench.hull.inscribed_ball import InscribedBall, ball_radius, hull_volume, inscribed_ball
+from surehold.grasping.wrench.hull.inscribed_ball import (
+    InscribedBall,
+    ball_inside,
+    ball_radius,
+    hull_volume,
+    inscribed_ball,
+)
 
 __all__ = [
     "InscribedBall",
@@ -50,22 +57,40 @@ __all__ = [
 class WrenchQuality:
     """How well contacts resist wrenches from all directions, in units of the force of one contact."""
 
+    told_too: ClassVar[tuple[str, ...]] = ("signed_epsilon", "weakest")
+    """What `grasp_to_dict` tells beside the fields."""
+
     epsilon: float
     """Radius of the largest origin-centered ball in the hull of the wrenches; 0 means not force closure."""
-    signed_epsilon: float
-    """The same, but minus the distance from the origin to the hull where the origin is outside."""
     force_closure: bool
     """Whether epsilon > 0."""
     lower: float
     """Certified lower bound of epsilon."""
     upper: float
     """Certified upper bound of epsilon; equal to `lower` to rounding, for round cones usually to 1e-9."""
-    weakest: NDArray[np.float64] = field(repr=False, compare=False)
-    """Unit wrench direction in which the grasp resists least, (6,)."""
     fallbacks: int
     """0: as planned; else how often rounding spoiled the expansion: a coarser tolerance helps, or the full hull."""
     wrenches: NDArray[np.float64] = field(repr=False, compare=False, metadata={"derived": True})
     """Wrenches of the cone edges, (m, 6)."""
+    _round: RoundContacts | None = field(repr=False, compare=False, metadata={"derived": True})
+    _ball: InscribedBall | None = field(repr=False, compare=False, metadata={"derived": True})
+
+    @property
+    def signed_epsilon(self) -> float:
+        """The same, but minus the distance from the origin to the hull where the origin is outside.
+
+        Found at the first request, which takes longer than epsilon.
+        """
+        return self._whole.signed
+
+    @property
+    def weakest(self) -> NDArray[np.float64]:
+        """Unit wrench direction in which the grasp resists least, (6,); found with `signed_epsilon`."""
+        return self._whole.normal
+
+    @cached_property
+    def _whole(self) -> InscribedBall:
+        return self._ball or inscribed_ball(self.wrenches, self._round)
 
     @cached_property
     def volume(self) -> float:
@@ -129,7 +154,10 @@ def wrench_quality(
         points, normals, friction, torque_length, origin, tangents, convention, weights, torsion
     )
     wrenches = cone_edges(contacts, edges)
-    ball = inscribed_ball(wrenches, round_contacts(contacts) if cones == "round" else None)
+    circles = round_contacts(contacts) if cones == "round" else None
+    ball, fallbacks = ball_inside(wrenches, circles)
+    if ball is None:
+        return WrenchQuality(0.0, False, 0.0, 0.0, fallbacks, wrenches, circles, None)
     return WrenchQuality(
-        ball.radius, ball.signed, ball.radius > 0.0, ball.lower, ball.upper, ball.normal, ball.fallbacks, wrenches
+        ball.radius, ball.radius > 0.0, ball.lower, ball.upper, ball.fallbacks, wrenches, circles, ball
     )

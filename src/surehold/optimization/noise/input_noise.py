@@ -22,7 +22,7 @@ from surehold.optimization.noise.samples import Samples, checked_samples
 from surehold.optimization.noise.uniform import Uniform
 from surehold.optimization.noise.varying import Varying
 
-__all__ = ["InputNoise", "checked_input_noise", "noise_of_coordinates"]
+__all__ = ["InputNoise", "checked_input_noise", "needed_input_noise", "noise_of_coordinates"]
 
 _NO_NOISE: Final = "input noise of 0 in every variable is no noise; pass input_noise=None."
 
@@ -219,6 +219,14 @@ def checked_input_noise(value: Any, names: tuple[str, ...]) -> InputNoise | None
             f"variable's range, or sh.InputNoise({{{named}}}) for standard deviations in the variables' own units."
         )
     raise InputError(f"{shown}; give sh.InputNoise({{name: standard deviation}}) for {', '.join(names)}, or None.")
+
+
+def needed_input_noise(value: Any, names: tuple[str, ...]) -> InputNoise:
+    """Return input noise where there must be some; raises InputError if it is none."""
+    noise = checked_input_noise(value, names)
+    if noise is None:
+        raise InputError(f"the input noise is None; give sh.InputNoise({{name: deviation}}) for {', '.join(names)}.")
+    return noise
 
 
 def noise_of_coordinates(noise: InputNoise | None, box: Box) -> InputNoise | None:

@@ -15,6 +15,8 @@ __all__ = ["single_threaded"]
 
 @cache
 def _controller() -> ThreadpoolController:
+    import scipy.linalg.cython_blas  # noqa: F401  # whose library the compiled functions use, loaded by now or not
+
     return ThreadpoolController()  # scans the loaded libraries, once
 
 

@@ -7,7 +7,7 @@ Legend
     outcome   UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over perturbations i and particles j     thesis (3.21)
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,6 +61,10 @@ class Ranking:
     """whether observations carry noise, so that the highest one is no incumbent"""
     screened: bool = True
     """whether the coarse perturbations and a part of the particles choose which inputs are ranked accurately"""
+    _last: list[tuple[Posterior, NDArray[np.float64], NDArray[np.intp]]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+    """posterior, tried inputs and their order: of asks between which nothing is told, only the first one ranks"""
 
     def order(
         self, posterior: Posterior, U: NDArray[np.float64], observed: NDArray[np.float64] | None = None
@@ -152,8 +156,13 @@ class Ranking:
         return RiskImprovement(posterior, self.accurate, self.risk, None, np.random.default_rng(0))
 
     def _order_of_tried(self, posterior: Posterior, history: History) -> NDArray[np.intp]:
+        for known, tried, order in self._last:
+            if known is posterior and np.array_equal(tried, history.tried):
+                return order
         many = len(history.tried) > CONTENDERS
-        return self.order(posterior, history.tried, history.observed if many and not self._exact else None)
+        order = self.order(posterior, history.tried, history.observed if many and not self._exact else None)
+        self._last[:] = [(posterior, history.tried, order)]
+        return order
 
     @property
     def _exact(self) -> bool:

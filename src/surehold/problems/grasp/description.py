@@ -67,7 +67,7 @@ def described_object(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
 
 
 def described_hand(name: str, config: str, preshape: str = "") -> Hand:
-    """Return the hand of a name or of a model file with its description.
+    """Return the hand of a name, of a description that names its model, or of a model file with its description.
 
     A preshape that is a synergy file is added to the hand's, under the name of the file as it is given.
 
@@ -81,12 +81,20 @@ def described_hand(name: str, config: str, preshape: str = "") -> Hand:
 
         synergy = read_synergy(preshape)
         return with_synergy(described_hand(name, config), synergy, preshape)
-    if not Path(name).suffix:
+    suffix = Path(name).suffix.lower()
+    if suffix in (".yaml", ".yml") and not config:
+        from surehold.grasping.hand.files import packaged_hand
+
+        return packaged_hand(name)
+    if not suffix:
         if config:
             raise InputError(f"hand-config describes a model file; give that as the hand, not '{name}'.")
         return hand_named(name)
     if not config:
-        raise InputError(f"hand {name} is a model file; describe its palm and fingers with hand-config: a YAML file.")
+        raise InputError(
+            f"hand {name} is a model file; describe its palm and fingers with hand-config: a YAML file, such as "
+            f"`surehold hand new {name}` writes."
+        )
     from surehold.grasping.hand.files import load_hand
 
     return load_hand(name, config)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.shape.belief import ShapeBelief, grid_of
-from surehold.grasping.shape.implicit_surface import Observations, surface_of
+from surehold.grasping.shape.implicit_surface import Observations, spaced, surface_of
 from surehold.grasping.shape.prior import PriorShape
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.grasp.problem import GraspProblem
@@ -39,7 +39,10 @@ _STEP: Final = 0.06  # of these, in widths of the box
 _ANSWERS: Final = 6  # that are compared under the hand noise
 _DISTURBED: Final = 12
 _SPREAD: Final = (0.25, 0.7)  # of the shape about the box: deviation and length scale, in mean half extents
-_CELL: Final = 0.004  # m
+_CELL: Final = 0.004  # m, of a grid of at most
+_NODES: Final = 100_000  # nodes: each trial makes some shapes anew
+_FREE_SPACING: Final = 0.008  # free points in the same cube of this edge count once [m]
+_GROWTH: Final = 1.0  # of the grid beyond the box, in deviations: what is told of a box is nearly right
 
 
 class ExploredGrasp(NamedTuple):
@@ -74,7 +77,8 @@ def belief_of_size(edges: Sequence[float], name: str = "box", mass: float | None
 def _of_prior(box: PriorShape, cell: float, name: str, mass: float | None, friction: float) -> ShapeBelief:
     size = float(np.exp(np.mean(np.log(box.half))))
     surface = surface_of(box, Observations(), _SPREAD[0] * size, _SPREAD[1] * size)
-    return ShapeBelief(surface, grid_of(surface, cell), name, mass, friction)
+    grid = grid_of(surface, cell, _GROWTH, _NODES)
+    return ShapeBelief(surface, grid, name, mass, friction)
 
 
 class Exploration:
@@ -117,7 +121,7 @@ class Exploration:
         self.X: Array = np.empty((0, problem.box.dimension))  #: trials told, in the units of the box
         self.y: Array = np.empty(0)  #: their qualities
         self._felt = belief.surface.observations  # all of it, bounds apart
-        self._free: Array = np.empty((0, 4))
+        self._seen, self._free = belief.free, np.empty((0, 4))
 
     def ask(self, pending: Array | None = None) -> Array:
         """Return the next trial (d,); `pending` (p, d) are under way."""
@@ -145,11 +149,12 @@ class Exploration:
         for each in felt:
             self._felt = self._felt + replace(each, free=np.empty((0, 4)))
             self._free = np.vstack([self._free, each.free])  # bounds become active anew: what is learnt may free them
+        self._free = self._free[spaced(self._free[:, :3], _FREE_SPACING)]
         if felt:
             surface = self.belief.surface
             told = replace(self._felt, free=self._free)
             learnt = surface_of(surface.prior, told, surface.std, surface.length)
-            self.belief = self.belief.with_surface(learnt, np.vstack([each.free for each in felt]))
+            self.belief = replace(self.belief, surface=learnt, free=np.vstack([self._seen, self._free]))
 
     def recommend(self, tried: bool = False) -> ExploredGrasp:
         """Return the grasp that is expected to hold best under shape and hand noise; `tried`: of the trials told."""

@@ -85,7 +85,9 @@ class GraspOptions(TypedDict, total=False):
     task: Annotated[ArrayLike | None, GraspOption(None, "Wrenches (k, 6) of the quality task.", text=None)]
     hand: Annotated[
         str | Hand,
-        GraspOption("icub-left", "icub-left, icub-right, shadow, panda, or a model file (.xml of MuJoCo, .urdf)."),
+        GraspOption(
+            "icub-left", "icub-left, icub-right, shadow, panda, a description (.yaml) or a model (.xml, .urdf)."
+        ),
     ]
     preshape: Annotated[
         str | None, GraspOption("", "Type of grasp: power, tripod or pinch for the iCub, or a synergy file (.yaml).")

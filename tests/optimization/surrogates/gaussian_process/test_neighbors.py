@@ -20,9 +20,9 @@ def _trials(n, d=2, seed=0):
     return X, _response(X)
 
 
-def _both(n, d=2, noise=None):
+def _both(n, d=2, noise=None, kernel="matern52"):
     X, y = _trials(n, d)
-    settings = {} if noise is None else {"noise": noise}
+    settings = {"kernel": kernel} if noise is None else {"kernel": kernel, "noise": noise}
     exact = sh.GaussianProcess(**settings).condition_on_all(X, y, np.random.default_rng(1))
     theta = exact.hyperparameters.theta
     return exact, NeighborPosterior(exact.evidence, theta, exact.outputs, exact.diagnostics.evaluations)
@@ -32,9 +32,11 @@ OFFSETS = 0.05 * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0
 WEIGHTS = np.array([0.4, 0.15, 0.15, 0.15, 0.15])
 
 
+@pytest.mark.parametrize("kernel", ["matern52", "matern52_two_scales"])
 @pytest.mark.parametrize("gradient", [False, True])
-def test_with_fewer_trials_than_neighbors_nothing_is_left_out(gradient):
-    exact, near = _both(NEIGHBORS[0])
+def test_with_fewer_trials_than_neighbors_nothing_is_left_out(gradient, kernel):
+    exact, near = _both(NEIGHBORS[0], kernel=kernel)
+    np.testing.assert_array_equal(near.length_scales, exact.length_scales)
     queries = np.random.default_rng(2).random((7, 2))
     for ours, theirs in zip(
         near.average(queries, OFFSETS, WEIGHTS, gradient),

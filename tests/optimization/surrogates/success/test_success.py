@@ -6,9 +6,11 @@ from scipy import integrate, optimize, stats
 from scipy.special import log_ndtr, ndtr
 
 from surehold.optimization.surrogates.gaussian_process.kernels import correlation
+from surehold.optimization.surrogates.success import model
 from surehold.optimization.surrogates.success.laplace import Counts, laplace, log_posterior, prior_covariance
 from surehold.optimization.surrogates.success.model import SuccessProcess
 from surehold.optimization.surrogates.success.posterior import probability
+from surehold.optimization.surrogates.success.propagation import propagated
 
 L, S2 = np.array([0.3, 0.5]), 1.5
 
@@ -97,6 +99,26 @@ def test_probabilities_are_those_of_exact_sampling():
     assert np.abs(ours - exact).max() < 0.01
 
 
+@pytest.mark.parametrize("v", [0.01, 2.5, 1e5])
+@pytest.mark.parametrize(("successes", "of"), [(1, 1), (5, 7), (0, 3)])
+def test_evidence_and_mean_of_a_single_place_are_exact(successes, of, v):
+    """With one site expectation propagation has nothing to approximate: one integral over f."""
+    s, r = np.array([float(successes)]), np.array([float(of)])
+
+    def integral(power):
+        return integrate.quad(
+            lambda f: f**power * ndtr(f) ** successes * ndtr(-f) ** (of - successes) * stats.norm.pdf(f, 0.0, v**0.5),
+            -8.0 * v**0.5,
+            8.0 * v**0.5,
+            points=[-6.0, -3.0, 0.0, 3.0, 6.0] if v > 1.0 else None,
+            limit=200,
+        )[0]
+
+    sites = propagated(np.array([[v]]), s, r, np.full(1, 0.1), np.zeros(1))
+    assert sites.log_evidence == pytest.approx(np.log(integral(0)), abs=2e-3)
+    assert v * sites.alpha[0] == pytest.approx(integral(1) / integral(0), abs=2e-3 * v**0.5)
+
+
 def test_moments_of_the_probability_by_quadrature():
     for mu, v in [(0.3, 0.5), (-1.7, 2.0), (4.0, 0.01), (0.0, 1.0)]:
         mean, variance, _ = probability(np.array(mu), np.array(v))
@@ -146,6 +168,28 @@ def test_repeated_trials_are_counts():
     np.testing.assert_allclose(fixed(X, y, 4).moments(Q).mean, fixed(single, outcomes).moments(Q).mean, atol=1e-12)
 
 
+def test_of_many_trials_the_near_ones_count_together(monkeypatch):
+    """Nothing is lost, and what is said is what all trials say, nearly: places of a hundred stand for 500 trials."""
+    rng = np.random.default_rng(3)
+    X = np.concatenate([rng.random((150, 2)), np.clip(0.6 + 0.06 * rng.standard_normal((350, 2)), 0.0, 1.0)])
+    y = (rng.random(500) < ndtr(1.5 - 8.0 * ((X - 0.6) ** 2).sum(axis=1))).astype(float)
+    Q = np.concatenate([rng.random((50, 2)), 0.6 + 0.06 * rng.standard_normal((50, 2))])
+    monkeypatch.setattr(model, "SUCCESS_PLACES", 500)
+    every = fixed(X, y)
+    assert len(every.counts.X) == 500
+    monkeypatch.setattr(model, "SUCCESS_PLACES", 100)
+    some = fixed(X, y)
+    assert 90 < len(some.counts.X) <= 100
+    assert some.counts.trials.sum() == 500.0
+    assert some.counts.successes.sum() == y.sum()
+    assert some.counts.trials @ some.counts.X == pytest.approx(X.sum(axis=0))
+    every, some = every.moments(Q), some.moments(Q)
+    off = np.abs(some.mean - every.mean)[0]
+    assert off.max() < 0.06
+    assert off[50:].max() < 0.02  # where most trials are, places are near each other
+    assert np.abs(np.sqrt(some.variance) - np.sqrt(every.variance)).max() < 0.03
+
+
 def test_pending_trials_narrow_and_move_nothing():
     X, y = data(20)
     posterior, at = fixed(X, y), np.array([[0.2, 0.9]])
@@ -158,7 +202,7 @@ def test_pending_trials_narrow_and_move_nothing():
 
 def test_log_posterior_adds_the_prior():
     X, y = data(15)
-    counts = Counts(X, y, np.ones(15), np.zeros(3), np.ones(3), 1e-10, 1.0, 0)
+    counts = Counts(X, y, np.ones(15), np.zeros(3), np.ones(3), 1e-10, 1.0, 0, np.empty((0, 2), dtype=np.int64))
     theta = np.array([-1.0, -0.5, 0.4])
     K = np.empty((15, 15))
     prior_covariance(theta, counts, K)

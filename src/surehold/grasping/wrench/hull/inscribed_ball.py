@@ -21,7 +21,7 @@ from surehold.errors import InputError
 from surehold.grasping.wrench.friction_cones import RoundContacts, finite_array
 from surehold.grasping.wrench.hull.nearest_facet import DONE, FAILED, FLAT, OUTSIDE, SPENT, expand_nearest
 
-__all__ = ["InscribedBall", "ball_radius", "hull_volume", "inscribed_ball", "nearest_point"]
+__all__ = ["InscribedBall", "ball_inside", "ball_radius", "hull_volume", "inscribed_ball", "nearest_point"]
 
 TOLERANCES = (1e-11, 1e-9)
 """Tried in turn: distances below this fraction of the largest wrench count as zero."""
@@ -83,19 +83,37 @@ def inscribed_ball(wrenches: ArrayLike, round_contacts: RoundContacts | None = N
     more than 65,535.
     """
     w = finite_array("wrenches", wrenches, (None, 6))
+    found = _ball(w, round_contacts)
+    if found.signed > 0.0:
+        return found
+    nearest = nearest_point(w, round_contacts) if len(w) else np.zeros(6)
+    distance = float(np.sqrt(nearest @ nearest))
+    if not distance:
+        return found._replace(upper=max(found.upper, 0.0))
+    return found._replace(signed=-distance, upper=0.0, normal=-nearest / distance)
+
+
+def ball_inside(
+    wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None
+) -> tuple[InscribedBall | None, int]:
+    """Return the ball and the fallbacks; None in place of a ball that is not there: how far is not asked for."""
+    found = _ball(wrenches, round_contacts)
+    if found.signed > 0.0:
+        return found, found.fallbacks
+    return (None if found.upper <= 0.0 else inscribed_ball(wrenches, round_contacts)), found.fallbacks
+
+
+def _ball(w: NDArray[np.float64], round_contacts: RoundContacts | None) -> InscribedBall:
+    """Return the ball; where there is none its radius and lower bound are 0, and how far the hull is stays open."""
     status, lower, upper, normal, expansions, facets, fallbacks = _expand(w, round_contacts)
     if status == FAILED:
         lower, normal = _ball_from_hull(w)
         upper = lower if round_contacts is None else max(lower, _round_support(normal, round_contacts))
         status = DONE if lower > 0.0 else OUTSIDE
-    if status == DONE:
-        signed = upper if round_contacts is None else lower
-        return InscribedBall(signed, lower, upper, normal, expansions, facets, fallbacks)
-    nearest = nearest_point(w, round_contacts) if len(w) else np.zeros(6)
-    distance = float(np.sqrt(nearest @ nearest))
-    if distance > 0.0:
-        upper, normal = 0.0, -nearest / distance
-    return InscribedBall(-distance if distance else 0.0, 0.0, max(upper, 0.0), normal, expansions, facets, fallbacks)
+    if status != DONE:
+        return InscribedBall(0.0, 0.0, upper, normal, expansions, facets, fallbacks)
+    signed = upper if round_contacts is None else lower
+    return InscribedBall(signed, lower, upper, normal, expansions, facets, fallbacks)
 
 
 def nearest_point(wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None) -> NDArray[np.float64]:

@@ -23,6 +23,7 @@ from surehold.defaults import (
 )
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.points import numbers_of
 from surehold.optimization.surrogates.gaussian_process.heteroscedastic import most_likely_noise
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
     Learning,
@@ -32,12 +33,13 @@ from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
     learn,
     mode,
 )
-from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
+from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, kernel_number
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence, log_posterior
 from surehold.optimization.surrogates.gaussian_process.neighbors import NeighborPosterior
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization, checked_range
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 from surehold.optimization.surrogates.protocol import Posterior, mixture
+from surehold.optimization.values import LARGEST
 
 __all__ = ["NOISES", "GaussianProcess", "NoiseName"]
 
@@ -127,6 +129,9 @@ class GaussianProcess:
             raise InputError(f"length_scales are {length_scales!r}; give positive finite numbers, one a dimension.")
         self._posterior: GaussianProcessPosterior | NeighborPosterior | None = None
         self._learnt: OrderedDict[bytes, tuple[Standardization, Learnt]] = OrderedDict()  # saves time, changes nothing
+
+    def __repr__(self) -> str:
+        return f"GaussianProcess(kernel={KERNELS[self._kernel]!r}, noise={self._noise!r})"
 
     @property
     def known_noise(self) -> float | None:
@@ -377,9 +382,9 @@ def checked_data(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return X (n, d) and y (n,) as float64 arrays (y empty where None); raises InputError where they do not fit."""
     try:
-        inputs = np.ascontiguousarray(X, dtype=np.float64)
-        outputs = np.ascontiguousarray([] if y is None else y, dtype=np.float64)
-    except (TypeError, ValueError):
+        inputs = np.ascontiguousarray(numbers_of(X))
+        outputs = np.ascontiguousarray(numbers_of([] if y is None else y))
+    except (TypeError, ValueError, OverflowError):
         raise InputError("X and y must be numeric arrays of shapes (n, d) and (n,).") from None
     if inputs.ndim != 2 or inputs.shape[1] == 0 or (d is not None and inputs.shape[1] != d):
         wanted = "(n, d)" if d is None else f"(q, {d})"
@@ -389,8 +394,8 @@ def checked_data(
     if y is not None and len(inputs) == 0:
         raise InputError("X has no rows; give at least one observation.")
     for name, values in (("X", inputs), ("y", outputs)):
-        if not np.all(np.isfinite(values)):
-            raise InputError(f"{name} holds NaN or infinity; remove those observations first.")
+        if not np.all(np.abs(values) <= LARGEST):
+            raise InputError(f"{name} holds NaN or numbers beyond {LARGEST:g}; remove those observations first.")
     return inputs, outputs
 
 
@@ -408,8 +413,8 @@ def checked_noise_setting(noise: float | NoiseName) -> float | NoiseName:
 
 def checked_noise(noise: ArrayLike, n: int) -> NDArray[np.float64]:
     try:
-        deviations = np.asarray(noise, dtype=np.float64)
-    except (TypeError, ValueError):
+        deviations = numbers_of(noise)
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"noise is {noise!r}; give {n} standard deviations, one an observation.") from None
     if deviations.shape != (n,):
         raise InputError(f"noise has shape {deviations.shape}, but there are {n} observations; give one number each.")

@@ -45,12 +45,7 @@ class NeighborPosterior:
         m, (n, d) = len(theta), evidence.X.shape
         self.evidence: Final = evidence
         self.outputs: Final = outputs
-        self.hyperparameters: Final = Hyperparameters(
-            theta,
-            np.exp(-theta[:, :d]),
-            np.exp(theta[:, d]) if evidence.learn_signal else np.full(m, evidence.signal_variance),
-            np.exp(theta[:, -1]) if evidence.learn_noise else np.zeros(m),
-        )
+        self.hyperparameters: Final = Hyperparameters.of(theta, evidence)
         self._Y: Final = np.ascontiguousarray(np.broadcast_to(evidence.y, (m, n)) if Y is None else Y)
         self._scale: Final = np.exp(-theta[:, :d].mean(axis=0))
         parts = [np.arange(n)[:: _COARSER**level] for level in range(3)]
@@ -168,7 +163,7 @@ class NeighborPosterior:
     @property
     def length_scales(self) -> NDArray[np.float64]:
         """Length-scales of the particles, (m, d), in widths of the unit cube."""
-        return 1.0 / self.hyperparameters.inverse_l
+        return 1.0 / self.hyperparameters.inverse_l[:, : self.evidence.X.shape[1]]
 
 
 @njit(cache=True)

@@ -32,6 +32,20 @@ class Hyperparameters(NamedTuple):
     v: NDArray[np.float64]
     """learnt noise variances in standardized units, (m,)"""
 
+    @classmethod
+    def of(cls, theta: NDArray[np.float64], evidence: Evidence) -> "Hyperparameters":
+        """Return the particles theta (m, p) unpacked, as `likelihood.scales_of` and `unpack` do with one."""
+        m, d = len(theta), evidence.X.shape[1]
+        inverse_l, position = np.exp(-theta[:, :d]), d + shape_size(evidence.kernel)
+        if shape_size(evidence.kernel):
+            inverse_l = np.column_stack([inverse_l, np.exp(theta[:, d]), expit(theta[:, d + 1])])
+        return cls(
+            theta,
+            inverse_l,
+            np.exp(theta[:, position]) if evidence.learn_signal else np.full(m, evidence.signal_variance),
+            np.exp(theta[:, -1]) if evidence.learn_noise else np.zeros(m),
+        )
+
 
 class Factors(NamedTuple):
     """What every prediction needs of the data's covariance A = L L' under each particle."""
@@ -66,14 +80,7 @@ class GaussianProcessPosterior:
         self.evidence: Final = evidence
         self.outputs: Final = outputs
         self.log_noise: Final = log_noise
-        self.hyperparameters: Final = Hyperparameters(
-            theta,
-            _scales(theta, d, evidence.kernel),
-            np.exp(theta[:, d + shape_size(evidence.kernel)])
-            if evidence.learn_signal
-            else np.full(m, evidence.signal_variance),
-            np.exp(theta[:, -1]) if evidence.learn_noise else np.zeros(m),
-        )
+        self.hyperparameters: Final = Hyperparameters.of(theta, evidence)
         self._Y: Final = np.ascontiguousarray(np.broadcast_to(evidence.y, (m, n)) if Y is None else Y)
         self.factors: Final = factors or self._factorized()
         self.diagnostics: Final = FitDiagnostics(n, cost, self.factors.repaired, outputs.flat)
@@ -220,14 +227,6 @@ class GaussianProcessPosterior:
         if self.log_noise is not None:
             return np.exp(self.log_noise.moments(X).mean[0])
         return np.full(len(X), self.evidence.noise.mean())
-
-
-def _scales(theta: NDArray[np.float64], d: int, kernel: int) -> NDArray[np.float64]:
-    """Return the kernel's scales of particles theta (m, p); as `likelihood.scales_of`, for all of them."""
-    inverse_l = np.exp(-theta[:, :d])
-    if not shape_size(kernel):
-        return inverse_l
-    return np.column_stack([inverse_l, np.exp(theta[:, d]), expit(theta[:, d + 1])])
 
 
 def left_out(

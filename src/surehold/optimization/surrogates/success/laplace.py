@@ -2,7 +2,8 @@
 
 Legend
     X         inputs (n, d) in the unit cube; s successes of r trials at each, (n,)
-    f         latent function, (n,); K its prior covariance s2 (C + ratio I) + m2 11', C the correlation
+    f         latent function, (n,); K its prior covariance s2 (C + ratio I) + m2 11', C the correlation; of pairs that
+              were compared in place of f the differences g = (f_a - f_b) / sqrt 2, which have a covariance as well
     Phi, phi  standard normal distribution function and density;  log p(s | f) = s log Phi(f) + (r - s) log Phi(-f)
     u, W      d log p / df and -d2 log p / df2, (n,)
     a         K^-1 f at the mode, where it equals u
@@ -23,7 +24,7 @@ from surehold.optimization.numerics.cholesky import cholesky, solve_lower, solve
 from surehold.optimization.surrogates.gaussian_process.likelihood import data_covariance
 from surehold.store.kernels import njit
 
-__all__ = ["Counts", "laplace", "log_posterior"]
+__all__ = ["Counts", "compared_covariance", "laplace", "log_posterior"]
 
 _NEWTON: Final = 50  # steps at most; six are usual
 _HALVINGS: Final = 30
@@ -51,6 +52,8 @@ class Counts(NamedTuple):
     """m2, prior variance of the constant mean"""
     kernel: int
     """number of the kernel"""
+    pairs: NDArray[np.int64]
+    """rows of X that were compared, (n, 2), success being that the first was preferred; (0, 2) where s is at each X"""
 
 
 @njit(cache=True)
@@ -164,6 +167,19 @@ def prior_covariance(theta, counts, K):
 
 
 @njit(cache=True)
+def compared_covariance(K, pairs):
+    """Return the covariance (p, p) of the differences over root 2 of pairs (p, 2), given that of f, K (n, n)."""
+    p = pairs.shape[0]
+    G = np.empty((p, p))
+    for i in range(p):
+        a, b = pairs[i, 0], pairs[i, 1]
+        for k in range(p):
+            c, d = pairs[k, 0], pairs[k, 1]
+            G[i, k] = 0.5 * (K[a, c] - K[a, d] - K[b, c] + K[b, d])
+    return G
+
+
+@njit(cache=True)
 def log_posterior(theta, counts):
     """Return the approximate log evidence plus the log prior of theta, up to a constant."""
     value = 0.0
@@ -173,6 +189,9 @@ def log_posterior(theta, counts):
         z = (theta[i] - counts.prior_mean[i]) / counts.prior_deviation[i]
         value -= 0.5 * z * z
     n = counts.X.shape[0]
-    K, L = np.empty((n, n)), np.empty((n, n))
+    K = np.empty((n, n))
     prior_covariance(theta, counts, K)
-    return value + laplace(K, counts.successes, counts.trials, np.empty(n), np.empty(n), L)
+    if counts.pairs.shape[0] > 0:
+        K = compared_covariance(K, counts.pairs)
+    p = K.shape[0]
+    return value + laplace(K, counts.successes, counts.trials, np.empty(p), np.empty(p), np.empty((p, p)))

@@ -1,19 +1,23 @@
 """Binary outcomes as a surrogate: a Gaussian process behind a probit likelihood, hyperparameters slice-sampled."""
 
+import warnings
 from collections import OrderedDict
 from math import log, sqrt
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.cluster.vq import kmeans2
 
 from surehold.defaults import (
     LENGTH_SCALE_DEVIATION,
     LENGTH_SCALE_MEDIAN,
+    MANY_LEARNT,
     NUGGET,
     PARTICLES,
     SUCCESS_BURN_IN,
     SUCCESS_MEAN_VARIANCE,
+    SUCCESS_PLACES,
     SUCCESS_SIGNAL_PRIOR,
     THIN,
 )
@@ -25,9 +29,10 @@ from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.surrogates.success.laplace import Counts, log_posterior
 from surehold.optimization.surrogates.success.posterior import SuccessPosterior
 
-__all__ = ["SuccessProcess"]
+__all__ = ["SuccessProcess", "counted", "learnt"]
 
 _REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
+_LLOYD: Final = 10  # rounds of the clustering
 
 
 class SuccessProcess:
@@ -80,44 +85,73 @@ class SuccessProcess:
     ) -> SuccessPosterior:
         """Learn from X (n, d) in the unit cube and shares of success y (n,) of `trials` (n,), 1 each by default.
 
-        Hyperparameters are learnt anew after every sixteenth part of the trials, as those of `GaussianProcess`.
+        Hyperparameters are learnt anew after every sixteenth part of the trials, as those of `GaussianProcess`; of many
+        trials from some of them, evenly taken in their order.
         """
         of = np.ones(len(y)) if trials is None else np.asarray(trials, dtype=np.float64)
         counts = self._counts(X, y * of, of)
         if self._fixed is not None:
             return SuccessPosterior(counts, self._fixed[None, :], 0)
         stream, k = int(rng.integers(2**63)), learnt_from(len(y))
-        key = fingerprint(X[:k], y[:k], of[:k], stream)
+        some = np.linspace(0, k - 1, min(k, MANY_LEARNT)).round().astype(np.intp)
+        key = fingerprint(X[some], y[some], of[some], stream)
         if key not in self._learnt:
-            early = self._counts(X[:k], (y * of)[:k], of[:k])
-            samples = elliptical_slice_sample(
-                log_posterior,
-                early,
-                early.prior_mean,
-                np.diag(early.prior_deviation),
-                np.random.default_rng([stream, k]),
-                keep=PARTICLES,
-                burn_in=SUCCESS_BURN_IN,
-                thin=THIN,
-            )
-            self._learnt[key] = samples.states, samples.evaluations
+            early = self._counts(X[some], (y * of)[some], of[some])
+            self._learnt[key] = learnt(early, np.random.default_rng([stream, k]))
             while len(self._learnt) > _REMEMBERED:
                 self._learnt.popitem(last=False)
         return SuccessPosterior(counts, *self._learnt[key])
 
     def _counts(self, X: NDArray[np.float64], successes: NDArray[np.float64], trials: NDArray[np.float64]) -> Counts:
-        """Return the data, trials of the same input put together."""
-        places, which = np.unique(X, axis=0, return_inverse=True)
-        d = X.shape[1]
-        prior = [(log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION)] * d + [SUCCESS_SIGNAL_PRIOR]
-        mean, deviation = np.array(prior).T
-        return Counts(
-            np.ascontiguousarray(places, dtype=np.float64),
-            np.bincount(which.ravel(), successes, len(places)).astype(np.float64),
-            np.bincount(which.ravel(), trials, len(places)).astype(np.float64),
-            np.ascontiguousarray(mean),
-            np.ascontiguousarray(deviation),
-            NUGGET,
-            self._mean_variance,
-            self._kernel,
-        )
+        return counted(X, successes, trials, self._kernel, self._mean_variance)
+
+
+def learnt(counts: Counts, rng: np.random.Generator) -> tuple[NDArray[np.float64], int]:
+    """Return particles (m, d + 1) of the hyperparameters, and how often their density was evaluated."""
+    samples = elliptical_slice_sample(
+        log_posterior,
+        counts,
+        counts.prior_mean,
+        np.diag(counts.prior_deviation),
+        rng,
+        keep=PARTICLES,
+        burn_in=SUCCESS_BURN_IN,
+        thin=THIN,
+    )
+    return samples.states, samples.evaluations
+
+
+def counted(
+    X: NDArray[np.float64],
+    successes: NDArray[np.float64],
+    trials: NDArray[np.float64],
+    kernel: int,
+    mean_variance: float = SUCCESS_MEAN_VARIANCE,
+) -> Counts:
+    """Return the data of this many successes of trials (n,) at X (n, d), trials of the same input put together.
+
+    Of more than `SUCCESS_PLACES` inputs, those near each other count as one at their mean: that of their cluster
+    (Lloyd 1982), from starts evenly taken in their order, so that there are more where more was tried.
+    """
+    d = X.shape[1]
+    places, which = np.unique(X, axis=0, return_inverse=True)
+    which = which.ravel()
+    if len(places) > SUCCESS_PLACES:
+        starts = np.unique(X[np.linspace(0, len(X) - 1, SUCCESS_PLACES).round().astype(np.intp)], axis=0)
+        with warnings.catch_warnings(action="ignore"):  # a cluster may lose all its points, and is dropped
+            which = np.unique(kmeans2(X, starts, iter=_LLOYD, minit="matrix")[1], return_inverse=True)[1]
+        weight = np.bincount(which, trials)
+        places = np.stack([np.bincount(which, trials * X[:, k]) / weight for k in range(d)], axis=1)
+    prior = [(log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION)] * d + [SUCCESS_SIGNAL_PRIOR]
+    mean, deviation = np.array(prior).T
+    return Counts(
+        np.ascontiguousarray(places, dtype=np.float64),
+        np.bincount(which, successes, len(places)).astype(np.float64),
+        np.bincount(which, trials, len(places)).astype(np.float64),
+        np.ascontiguousarray(mean),
+        np.ascontiguousarray(deviation),
+        NUGGET,
+        mean_variance,
+        kernel,
+        np.empty((0, 2), dtype=np.int64),
+    )

@@ -23,10 +23,10 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import Evidenc
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import Factors, GaussianProcessPosterior
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
-from surehold.optimization.surrogates.success.laplace import Counts, laplace, prior_covariance
-from surehold.optimization.surrogates.success.propagation import propagated
+from surehold.optimization.surrogates.success.laplace import Counts, compared_covariance, laplace, prior_covariance
+from surehold.optimization.surrogates.success.propagation import Sites, propagated
 
-__all__ = ["SuccessPosterior", "probability", "shares"]
+__all__ = ["SuccessPosterior", "probability", "regression", "shares", "sites_of"]
 
 _STEP: Final = 1e-5  # of differences, in widths of the unit cube
 _LOG_SQRT_2PI: Final = 0.5 * np.log(2.0 * np.pi)
@@ -35,8 +35,8 @@ _LOG_SQRT_2PI: Final = 0.5 * np.log(2.0 * np.pi)
 class SuccessPosterior:
     """The probability of success, conditioned on trials; a `Posterior` of P, with that of f in `latent`.
 
-    `theta` (m, d + 1) are the particles, `pending` (p, d) trials under way, `sites` what `propagated` returns for each
-    particle, computed where None.
+    `theta` (m, d + 1) are the particles, `pending` (p, d) trials under way, `sites` those of each particle, computed
+    where None.
     """
 
     def __init__(
@@ -45,28 +45,18 @@ class SuccessPosterior:
         theta: NDArray[np.float64],
         cost: int,
         pending: NDArray[np.float64] | None = None,
-        sites: tuple[NDArray[np.float64], ...] | None = None,
+        sites: list[Sites] | None = None,
     ):
-        n, d = counts.X.shape
+        d = counts.X.shape[1]
         self.counts: Final = counts
         self._theta: Final = theta
         self._pending: Final = np.empty((0, d)) if pending is None else pending
-        m = len(theta)
-        if sites is None:
-            root, alpha, inverse = np.empty((m, n)), np.empty((m, n)), np.zeros((m, n, n))
-            K, L = np.empty((n, n)), np.empty((n, n))
-            for j in range(m):
-                a, W = np.empty(n), np.empty(n)
-                prior_covariance(theta[j], counts, K)
-                laplace(K, counts.successes, counts.trials, a, W, L)
-                root[j], alpha[j], inverse[j] = propagated(K, counts.successes, counts.trials, W, W * (K @ a) + a)
-            sites = root, alpha, inverse
-        root, alpha, inverse = (np.ascontiguousarray(part) for part in sites)
-        self._sites: Final = root, alpha, inverse
-        self.latent: GaussianProcessPosterior = _regression(counts, theta, cost, Factors(inverse, alpha, 0))
+        self.sites: Final = [sites_of(counts, one) for one in theta] if sites is None else sites
+        inverse, alpha = np.stack([one.half for one in self.sites]), np.stack([one.alpha for one in self.sites])
+        self.latent: GaussianProcessPosterior = regression(counts, theta, cost, Factors(inverse, alpha, 0))
         if len(self._pending):
             self.latent = self._with(self._pending, cost)
-        self.diagnostics: Final = FitDiagnostics(n, cost, 0, False)
+        self.diagnostics: Final = FitDiagnostics(len(counts.X), cost, 0, False)
         self.regions: Final = Regions.whole(d)
 
     def _with(self, X: NDArray[np.float64], cost: int) -> GaussianProcessPosterior:
@@ -74,7 +64,7 @@ class SuccessPosterior:
         mu = self.latent.moments(X).mean  # (m, k)
         # expected information of one trial, phi^2 / (Phi (1 - Phi))
         information = np.exp(-mu * mu - 2.0 * _LOG_SQRT_2PI - log_ndtr(mu) - log_ndtr(-mu))
-        root = np.concatenate([self._sites[0], np.sqrt(information)], axis=1)
+        root = np.concatenate([np.stack([one.root for one in self.sites]), np.sqrt(information)], axis=1)
         m, n = root.shape
         k = len(X)
         alpha = np.concatenate([self.latent.factors.alpha, np.zeros((m, k))], axis=1)
@@ -88,7 +78,7 @@ class SuccessPosterior:
             prior_covariance(self._theta[j], larger, K)
             B = np.eye(n) + root[j][:, None] * K * root[j]
             inverse[j] = solve_triangular(np.linalg.cholesky(B), np.diag(root[j]), lower=True)
-        return _regression(larger, self._theta, cost, Factors(inverse, alpha, 0))
+        return regression(larger, self._theta, cost, Factors(inverse, alpha, 0))
 
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of P at queries (q, d)."""
@@ -151,20 +141,29 @@ class SuccessPosterior:
         """Return the posterior of about `count` of the particles, evenly taken from number `first` on."""
         step = max(1, len(self._theta) // count)
         every = slice(first % step, None, step)
-        sites = tuple(part[every] for part in self._sites)
-        return SuccessPosterior(
-            self.counts, np.ascontiguousarray(self._theta[every]), self.diagnostics.evaluations, self._pending, sites
-        )
+        theta = np.ascontiguousarray(self._theta[every])
+        return SuccessPosterior(self.counts, theta, self.diagnostics.evaluations, self._pending, self.sites[every])
 
     def with_pending(self, X: NDArray[np.float64]) -> "SuccessPosterior":
         """Return the posterior as if one trial each at X (k, d) had brought what is expected: only variances shrink."""
         pending = np.concatenate([self._pending, X])
-        return SuccessPosterior(self.counts, self._theta, self.diagnostics.evaluations, pending, self._sites)
+        return SuccessPosterior(self.counts, self._theta, self.diagnostics.evaluations, pending, self.sites)
 
     def noise_variance(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance E[P (1 - P)] (m, q) of one outcome of 0 or 1 at X (q, d), P being given."""
         moments = self.moments(X)
         return np.maximum(moments.mean - moments.mean**2 - moments.variance, 0.0)
+
+
+def sites_of(counts: Counts, theta: NDArray[np.float64]) -> Sites:
+    """Return the sites under the hyperparameters theta (d + 1,), from Laplace's approximation on."""
+    n, p = len(counts.X), len(counts.successes)
+    K, L, a, W = np.empty((n, n)), np.empty((p, p)), np.empty(p), np.empty(p)
+    prior_covariance(theta, counts, K)
+    if len(counts.pairs):
+        K = compared_covariance(K, counts.pairs)
+    laplace(K, counts.successes, counts.trials, a, W, L)
+    return propagated(K, counts.successes, counts.trials, W, W * (K @ a) + a)
 
 
 def probability(
@@ -197,7 +196,7 @@ def _normals(s: int) -> NDArray[np.float64]:
     return ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12))
 
 
-def _regression(counts: Counts, theta: NDArray[np.float64], cost: int, factors: Factors) -> GaussianProcessPosterior:
+def regression(counts: Counts, theta: NDArray[np.float64], cost: int, factors: Factors) -> GaussianProcessPosterior:
     """Return the latent process as the regression that has these factors."""
     n = len(counts.X)
     evidence = Evidence(

@@ -100,6 +100,9 @@ class TreedGaussianProcess:
         self._learnt: OrderedDict[bytes, GaussianProcessPosterior] = OrderedDict()
         self._evidences: OrderedDict[bytes, float] = OrderedDict()
 
+    def __repr__(self) -> str:
+        return f"TreedGaussianProcess(min_leaf={self._min_leaf!r}, trees={self._trees}, process={self._process!r})"
+
     @property
     def known_noise(self) -> float | None:
         """Standard deviation of the observation noise, in the outputs' units, 0 for none; None where it is learnt."""
