@@ -279,6 +279,7 @@ class Simulator:
                 geometry.palms,
                 self.hand.palm_half_extents,
                 self.hand.palm_roundings,
+                self.hand.neighbors,
                 self.closing == "adaptive",
                 CLOSED,
                 self.depth if self.contact == "graded" else 0.0,

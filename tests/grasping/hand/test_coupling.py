@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
+from surehold.grasping import Simulator, default_pose
 from surehold.grasping.hand.configuration import HandConfig
 from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.kinematics import link_ends
@@ -212,3 +213,41 @@ def test_bodies_and_joints_without_a_name(tmp_path):
     assert all(np.array_equal(a, b) for a, b in zip(hand.arrays(), same.arrays(), strict=True))
     with pytest.raises(InputError, match=r"body 'wrist' is unknown; .*body 1"):
         hand_of(tmp_path, text, FINGERS | {"right": ["joint 3"]}, {"a1": 1.0}, palm=palm | {"body": "wrist"})
+
+
+JOINED = """
+<mujoco><compiler angle="radian"/><worldbody><body name="palm"><freejoint/>
+  <geom type="box" size=".01 .02 .01" pos="0 0 -.01"/><geom type="box" size=".01 .02 .02" pos="-.02 0 .02"/>
+  <body pos="0 0 .02"><joint name="a" axis="0 1 0" range="-1.5 1.5"/><geom name="a" type="capsule" size=".004 .01"/>
+    <body pos="0 0 .015"><joint name="b" axis="0 1 0" range="-2.5 2.5"/>
+      <geom name="b" type="capsule" size=".004 .01" pos="0 0 .012"/></body></body>
+  <body pos=".05 0 .02"><joint name="c" axis="0 1 0" range="-1.5 1.5"/><geom type="capsule" size=".004 .01"/></body>
+</body></worldbody></mujoco>
+"""
+
+
+def test_a_link_may_overlap_the_body_that_carries_it_as_in_mujoco(tmp_path):
+    """The inner link turns into a box of the palm that it does not touch at first; the outer one is stopped there."""
+    fingers = {"left": ["a", "b"], "right": ["c"]}
+    model = mujoco.MjModel.from_xml_string(JOINED)
+    data = mujoco.MjData(model)
+    data.joint("a").qpos[:] = -1.2
+    mujoco.mj_forward(model, data)
+    touching = {model.geom(g).name for contact in data.contact for g in contact.geom} - {""}
+    data.joint("a").qpos[:], data.joint("b").qpos[:] = 0.0, -2.0
+    mujoco.mj_forward(model, data)
+    touching_then = {model.geom(g).name for contact in data.contact for g in contact.geom} - {""}
+    assert "a" not in touching
+    assert "b" in touching_then
+    hand = hand_of(tmp_path, JOINED, fingers, {"b": -2.0})
+    assert hand.neighbors[[0, 1]].tolist() == [[True, True], [False, False]], "links a and b, boxes of the palm"
+    ends = {"inner": ({"a": -1.2}, ["body 2", "body 4"]), "outer": ({"b": -2.0}, None)}
+    for name, (closed, touching) in ends.items():
+        hand = hand_of(tmp_path, JOINED, fingers, closed, contact_links=touching)
+        simulator = Simulator(hand, "bottle")
+        away = default_pose(hand, simulator.object, "right-front", 0.3, (0.0,) * 6)
+        joints = dict(zip(hand.joint_names, simulator.grasp(away).joints.ravel(), strict=True))
+        if name == "inner":
+            assert joints["a"] == pytest.approx(-1.2)
+        else:
+            assert -1.9 < joints["b"] < -0.1, "stopped by the palm"

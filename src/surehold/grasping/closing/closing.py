@@ -159,12 +159,27 @@ def hand_gaps(nodes, frame, ends, radii, palms, halves, roundings, enough):
 
 @njit(cache=True)
 def close_hand(
-    nodes, frame, bases, chains, reach, motion, radii, palms, halves, roundings, adaptive, closed, brush, stop
+    nodes,
+    frame,
+    bases,
+    chains,
+    reach,
+    motion,
+    radii,
+    palms,
+    halves,
+    roundings,
+    neighbors,
+    adaptive,
+    closed,
+    brush,
+    stop,
 ):
     """Close the hand from its open posture, which must not touch the object.
 
     A link is stopped by the palm or by another finger unless it touches that at its first look already: neighbors in
-    the chain rest on each other. Passes nearer than `brush` are reported (0: none). `stop` (f, j) holds times at which
+    the chain rest on each other, and those of `neighbors` (f j, p) are links and boxes of the palm that always may.
+    Passes nearer than `brush` are reported (0: none). `stop` (f, j) holds times at which
     joints are stopped, whatever they touch, infinite for none; it is changed to the times at which they were.
     Returns the fields of `Closed`.
     """
@@ -186,8 +201,9 @@ def close_hand(
         first[total] = b
         total += 1
         for p in range(palms.shape[0]):
-            first[total], second[total] = b, -2 - p
-            total += 1
+            if not neighbors[b, p]:
+                first[total], second[total] = b, -2 - p
+                total += 1
         for c in range((f + 1) * per_finger, links):
             if radii[c // per_finger, c % per_finger] > 0.0:
                 first[total], second[total] = b, c

@@ -24,7 +24,7 @@ class _Finger(NamedTuple):
     chain: Array  #: (n, 19)
     radii: Array  #: (n,)
     joints: list[int | None]  #: (n,) numbers in the model
-    links: list[str]  #: (n,)
+    bodies: list[int]  #: (n,) numbers in the model; -1 for a link that is not there
     boxes: list[LinkBox]  #: links by their numbers in the finger
 
 
@@ -47,8 +47,12 @@ def built_hand(rest: RestingModel, file: str) -> Hand:
             if j is not None:
                 names[i][k] = rest.joint_names[j]
                 lower[i, k], upper[i, k] = couplings.range(j)
-        links[i][:n] = row.links
+        links[i][:n] = [rest.body_names[b] if b >= 0 else links[i][k] for k, b in enumerate(row.bodies)]
     boxes = palm_boxes(rest)
+    joined = np.zeros((f, longest, len(boxes)), dtype=bool)
+    for i, row in enumerate(rows):
+        for k, body in enumerate(row.bodies):
+            joined[i, k] = [body >= 0 and rest.joined(body, box.body) for box in boxes]
     flat = tuple(name for row in names for name in row)
     return Hand(
         name=config.name,
@@ -57,14 +61,15 @@ def built_hand(rest: RestingModel, file: str) -> Hand:
         radii=radii,
         lower=lower,
         upper=upper,
-        palm_poses=np.stack([box[0] for box in boxes]) if boxes else np.empty((0, 3, 4)),
-        palm_half_extents=np.stack([box[1] for box in boxes]) if boxes else np.empty((0, 3)),
-        palm_roundings=np.array([box[2] for box in boxes]),
+        palm_poses=np.stack([box.pose for box in boxes]) if boxes else np.empty((0, 3, 4)),
+        palm_half_extents=np.stack([box.half for box in boxes]) if boxes else np.empty((0, 3)),
+        palm_roundings=np.array([box.rounding for box in boxes]),
         grasp_center=np.asarray(config.palm.grasp_center),
         finger_names=tuple(rest.fingers),
         link_names=tuple(name for row in links for name in row),
         joint_names=flat,
         preshapes={name: described_preshape(name, rest, couplings, flat) for name in config.preshapes},
+        joined=joined.reshape(f * longest, -1),
         boxes=tuple(
             box._replace(links=tuple(i * longest + k for k in box.links))
             for i, row in enumerate(rows)
@@ -109,7 +114,7 @@ def _finger(rest: RestingModel, finger: str, joints: list[int]) -> _Finger:
         x = x - (x @ z) * z
         x = x / np.linalg.norm(x)
         frames.append(rest.placed(rest.data.xanchor[j], np.column_stack([x, np.cross(z, x), z])))
-    chain, radii, owners, links, boxes = [], [], [], [], []
+    chain, radii, owners, bodies, boxes = [], [], [], [], []
     for k, j in enumerate(joints):
         p, r = frames[k]
         capsules = []
@@ -120,20 +125,20 @@ def _finger(rest: RestingModel, finger: str, joints: list[int]) -> _Finger:
                 boxes.append(LinkBox(inside, r.T @ np.column_stack([pose[:, :3], pose[:, 3] - p]), half))
             capsules += [(part.body, r.T @ (near - p), r.T @ (far - p), radius) for near, far, radius in part.capsules]
         if not capsules:
-            capsules = [(f"{finger} {k + 1}", np.zeros(3), np.array([SHORTEST, 0.0, 0.0]), 0.0)]
+            capsules = [(-1, np.zeros(3), np.array([SHORTEST, 0.0, 0.0]), 0.0)]
         if k + 1 < len(joints):
             q, s = frames[k + 1]
             offset = np.column_stack([r.T @ s, r.T @ (q - p)])
         else:
             offset = np.eye(3, 4)
         slides = rest.model.jnt_type[j] == int(rest.mujoco.mjtJoint.mjJNT_SLIDE)
-        for i, (name, near, far, radius) in enumerate(capsules):
+        for i, (body, near, far, radius) in enumerate(capsules):
             end = i + 1 == len(capsules)
             chain.append(chain_row(near, far, offset if end else np.eye(3, 4), bool(slides and i == 0)))
             radii.append(radius)
             owners.append(j if i == 0 else None)
-            links.append(name)
+            bodies.append(body)
     if not any(radii):
         raise InputError(f"finger '{finger}' of hand '{rest.config.name}' has no geometry that can touch.")
     base = np.column_stack([frames[0][1], frames[0][0]])
-    return _Finger(base, np.stack(chain), np.array(radii), owners, links, boxes)
+    return _Finger(base, np.stack(chain), np.array(radii), owners, bodies, boxes)

@@ -18,7 +18,7 @@ from surehold.grasping.hand.cover import SHORTEST, Capsule, cover_box, cover_mes
 from surehold.grasping.hand.filling import filling_boxes
 from surehold.grasping.hand.rest import RestingModel
 
-__all__ = ["LinkPart", "link_parts", "palm_boxes"]
+__all__ = ["LinkPart", "PalmBox", "link_parts", "palm_boxes"]
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 class LinkPart(NamedTuple):
     """A geometry of a finger, in the palm frame."""
 
-    body: str
+    body: int  #: its body, by its number in the model
     capsules: list[Capsule]
     box: tuple[Array, Array] | None  #: pose (3, 4) and half extents (3,) of one that is a box
 
@@ -46,11 +46,20 @@ def link_parts(rest: RestingModel, finger: str, k: int) -> Iterator[LinkPart]:
             capsules = [(p + r @ near, p + r @ far, radius) for near, far, radius in _cover(rest, g)]
             center, half = _half(rest, g)
             flat = rest.model.geom_type[g] == int(rest.mujoco.mjtGeom.mjGEOM_BOX)
-            yield LinkPart(name, capsules, (np.column_stack([r, p + r @ center]), half) if flat else None)
+            yield LinkPart(body, capsules, (np.column_stack([r, p + r @ center]), half) if flat else None)
 
 
-def palm_boxes(rest: RestingModel) -> list[tuple[Array, Array, float]]:
-    """Return poses (3, 4) in the palm frame, half extents (3,) and roundings of the boxes of the palm."""
+class PalmBox(NamedTuple):
+    """A box with round edges, in the palm frame."""
+
+    body: int  #: that has it, by its number in the model
+    pose: Array  #: (3, 4)
+    half: Array  #: (3,)
+    rounding: float
+
+
+def palm_boxes(rest: RestingModel) -> list[PalmBox]:
+    """Return the boxes of the palm."""
     boxes = []
     types = rest.mujoco.mjtGeom
     for body in rest.of_palm:
@@ -62,7 +71,7 @@ def palm_boxes(rest: RestingModel) -> list[tuple[Array, Array, float]]:
                 smallest = float(half.min())
                 round_body = kind in (int(types.mjGEOM_SPHERE), int(types.mjGEOM_CAPSULE))
                 rounding = smallest * (1.0 - 1e-6) if round_body else min(0.003, 0.5 * smallest)
-                boxes.append((np.column_stack([r @ turn, p + r @ turn @ center]), half, rounding))
+                boxes.append(PalmBox(body, np.column_stack([r @ turn, p + r @ turn @ center]), half, rounding))
     return boxes
 
 

@@ -75,6 +75,8 @@ class Hand:
     link_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index distal"
     joint_names: tuple[str, ...] = field(repr=False)  #: (f j,) such as "index_distal"; "" for one that does not move
     preshapes: Mapping[str, Preshape] = field(repr=False)  #: grasp types; the first one is the default
+    #: (f j, p) links that are joined to a box of the palm and may enter it; none if not given
+    joined: NDArray[np.bool_] | None = field(default=None, repr=False)
     boxes: tuple[LinkBox, ...] = field(default=(), repr=False)  #: links with flat faces
     finger_force: float = 8.0  #: what a stretched finger can exert at its tip [N]; the check by physics takes it
     #: where the hand was read from; None for the built-in ones
@@ -92,12 +94,18 @@ class Hand:
         """Names (f j + 1,) of the bodies by number, such as "index distal", and at the end "palm"."""
         return (*self.link_names, "palm")
 
+    @cached_property
+    def neighbors(self) -> NDArray[np.bool_]:
+        """Which links (f j,) and boxes of the palm (p,) may overlap: (f j, p)."""
+        return np.zeros((self.palm, len(self.palm_poses)), dtype=bool) if self.joined is None else self.joined
+
     def arrays(self) -> tuple[Array, ...]:
         """Return all numbers that make up the hand, its preshapes included; equal arrays, equal grasps."""
         shapes = [part for preshape in self.preshapes.values() for part in (np.hstack(preshape[:3]), preshape[5])]
         geometry = (self.bases, self.chains, self.radii, self.lower, self.upper, self.palm_poses)
         rest = (self.palm_half_extents, self.palm_roundings, self.grasp_center, *map(np.asarray, shapes))
-        return geometry + rest + tuple(np.column_stack([box.pose, box.half]) for box in self.boxes)
+        joined = () if self.joined is None else (self.joined.astype(float),)
+        return geometry + rest + joined + tuple(np.column_stack([box.pose, box.half]) for box in self.boxes)
 
     def reach(self) -> Array:
         """Return (f, j, j): an upper bound of the speed of link k when joint i <= k moves at 1 [m/rad, or 1 in m/m].

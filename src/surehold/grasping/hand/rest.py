@@ -130,6 +130,11 @@ class RestingModel:
                 of_palm.append(body)
         return of_body, of_palm
 
+    def joined(self, body: int, other: int) -> bool:
+        """Whether one body carries the other by a joint: MuJoCo lets these two overlap."""
+        weld, parents = self.model.body_weldid, self.model.body_parentid
+        return bool(weld[parents[weld[body]]] == weld[other])
+
     def placed(self, position: Array, rotation: Array) -> tuple[Array, Array]:
         """Return a position (3,) and a rotation (3, 3) of the model's file in the palm frame."""
         return self.turn.T @ (position - self.origin), self.turn.T @ rotation
