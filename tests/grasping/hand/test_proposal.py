@@ -216,6 +216,7 @@ def bars(count, most=90, depth=1):
         (bars(8, depth=5), ("40 joints in 8 chains", "up to 32", "--palm")),
         (bars(2, depth=9), ("up to 9 in one", "fingers of 8")),
         (bars(9), ("9 joints in 9 chains", "32 in 8 fingers")),
+        (bars(301), ("301 joints move", "--palm BODY")),
         (bars(2, most=1.57), ("1.6 degrees at most", "radian")),
         ("<mujoco><worldbody>", ("not a model that MuJoCo can read",)),
         ("solid teapot", ("not a model that MuJoCo can read",)),
@@ -228,3 +229,9 @@ def test_models_that_are_no_hands(propose, model, words):
     assert "\n" not in message
     for word in words:
         assert word in message, message
+
+
+def test_names_that_are_no_text(tmp_path):
+    (tmp_path / "hand.xml").write_bytes(bars(2).encode().replace(b"j0_0", b"j\xff"))
+    with pytest.raises(InputError, match="save it as UTF-8"):
+        propose_hand(tmp_path / "hand.xml")

@@ -21,6 +21,7 @@ __all__ = ["Skeleton", "skeleton_of"]
 
 _BAR: Final = 0.5  # of the farthest reach: what does not reach that far holds no object
 _LONGER: Final = 1.3  # times as far reaches a finger as the bar that is coupled to it
+_MOST_OF_ALL: Final = 300  # joints of a robot whose hand is looked for
 _MOST_JOINTS, _MOST_CHAIN, _MOST_FINGERS = 32, 8, 8
 _TINY: Final = 0.1  # rad; a hand whose joints all turn less than that was written in radians and read in degrees
 _WORDS: Final = {
@@ -47,9 +48,12 @@ def skeleton_of(mujoco: Any, model: Any, file: str, palm: str = "") -> Skeleton:
     Raises
     ------
     InputError
-        If the model has no two fingers, more joints than a hand, joints without names, or no such body.
+        If the model has no two fingers, more joints than a hand, names that are no UTF-8, or no such body.
     """
-    return _Tree(mujoco, model, file, palm).skeleton()
+    try:
+        return _Tree(mujoco, model, file, palm).skeleton()
+    except UnicodeDecodeError:
+        raise InputError(f"{file!r} has names that are no UTF-8; save it as UTF-8.") from None
 
 
 class _Tree:
@@ -79,6 +83,8 @@ class _Tree:
         where = f"below body '{self.names[self.top]}' of {self.file!r}" if self.top else f"in {self.file!r}"
         if not self.joints:
             raise InputError(f"no joint moves {where}: a hand without fingers; give the model of a hand.")
+        if len(self.joints) > _MOST_OF_ALL:
+            raise InputError(f"{len(self.joints)} joints move {where}; give the model of a hand, or --palm BODY.")
         chains = self._chains()
         palm = self._palm(chains) if chains else self.top
         chains = {
@@ -107,10 +113,9 @@ class _Tree:
     def _check(self, fingers: Sequence[Sequence[int]], moving: Sequence[int], palm: int) -> None:
         longest = max(map(len, fingers))
         if len(moving) > _MOST_JOINTS or longest > _MOST_CHAIN or len(fingers) > _MOST_FINGERS:
-            inside = self.names[palm]
             raise InputError(
-                f"{len(moving)} joints in {len(fingers)} chains move below {inside}, up to {longest} in one; a hand "
-                f"has up to {_MOST_JOINTS} in {_MOST_FINGERS} fingers of {_MOST_CHAIN}: name the palm with --palm BODY."
+                f"{len(moving)} joints in {len(fingers)} chains move below {self.names[palm]}, up to {longest} in one; "
+                f"a hand has up to {_MOST_JOINTS} in {_MOST_FINGERS} fingers of {_MOST_CHAIN}: name the palm with --palm BODY."
             )
         hinges = [j for j in moving if self.model.jnt_type[j] == self.hinge and self.model.jnt_limited[j]]
         if hinges and all(np.ptp(self.model.jnt_range[j]) < _TINY for j in hinges):
@@ -165,11 +170,9 @@ class _Tree:
 
     def _moved(self, j: int) -> list[int]:
         """Return the bodies that j moves and no joint beyond it."""
-        below = [b for b in range(self.model.nbody) if self._is_below(b, self._body(j))]
-        later = {
-            self._body(i) for i in self.joints if i != j and self._body(i) in below and self._body(i) != self._body(j)
-        }
-        return [b for b in below if not later & set(self._above(b))]
+        below = {b for b in range(self.model.nbody) if self._is_below(b, self._body(j))}
+        later = (below & {self._body(i) for i in self.joints}) - {self._body(j)}
+        return sorted(b for b in below if not later & set(self._above(b)))
 
     def _palm(self, chains: Mapping[int, Sequence[int]]) -> int:
         """Return the last body that all chains share, or the highest rigid one above it that can touch."""
@@ -220,20 +223,23 @@ class _Tree:
         model, kinds = self.model, self.mujoco.mjtEq
         closed: dict[int, set[int]] = {leaf: set() for leaf in chains}
         coupled: dict[int, set[int]] = {leaf: set() for leaf in chains}
-        for e in range(model.neq):
+        for e, kind in enumerate(model.eq_type):
             ends = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
-            tied = closed
-            if model.eq_type[e] in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
+            if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
                 if model.eq_objtype[e] == int(self.mujoco.mjtObj.mjOBJ_SITE):
                     ends = [int(model.site_bodyid[end]) for end in ends]
-                groups = [
-                    {leaf for leaf, chain in chains.items() if chain and self._is_below(end, self._body(chain[-1]))}
-                    for end in ends
-                ]
+                tied, groups = (
+                    closed,
+                    [
+                        {leaf for leaf, chain in chains.items() if chain and self._is_below(end, self._body(chain[-1]))}
+                        for end in ends
+                    ],
+                )
+            elif kind in (int(kinds.mjEQ_JOINT), int(kinds.mjEQ_TENDON)):
+                joints = ends if kind == int(kinds.mjEQ_JOINT) else self._of_tendon(ends[0])
+                tied, groups = coupled, [{leaf for leaf, chain in chains.items() if j in chain} for j in joints]
             else:
-                tied = coupled
-                joints = ends if model.eq_type[e] == int(kinds.mjEQ_JOINT) else self._of_tendon(ends[0])
-                groups = [{leaf for leaf, chain in chains.items() if j in chain} for j in joints]
+                continue
             for group in groups:
                 for leaf in group:
                     tied[leaf] |= set().union(*groups) - {leaf}
