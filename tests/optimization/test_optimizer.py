@@ -414,7 +414,7 @@ def test_the_number_of_a_trial_is_its_place_in_the_design():
         ([[0.5, 0.5]], [1.0, 2.0], "one value"),
         ([[0.5, 1.5]], [1.0], "not inside"),
         ([[0.5, np.nan]], [1.0], "not inside"),
-        ([[0.5, 0.5]], [np.inf], "infinity"),
+        ([[0.5, 0.5]], [np.inf], "y holds inf"),
         ([0.5, 0.5], [1.0], "shape"),
     ],
 )
