@@ -128,7 +128,8 @@ def test_ten_million_points_are_thinned_before_anything_else():
     assert cloud.notes[0].startswith("of 10,000,000 points ")
     assert len(cloud.points) <= 2500
     off = np.abs(distance_field_of(shipped_object("mug")).distance(cloud.points))
-    assert np.quantile(off, 0.95) < 0.0015
+    # Means in cubes of 4 mm lie up to 1.4 mm inside edges even without noise.
+    assert np.quantile(off, 0.95) < 0.0020
     assert off.mean() < 0.0008
 
 

@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 MOST_POINTS: Final = 2500  #: from which a surface is learnt; more are thinned to it: dense algebra costs their cube
 _MOST_READ: Final = 60_000  # points that are looked at; of more, as many in each cube of a grid
 _AT_ONCE: Final = 1_000_000  # points that are put into cubes at once
-_CUBES: Final = 64  # edges of these cubes in the extent of the points: wider than the noise, finer than a part
+# Edges of these cubes in the extent of the points: finer than a part, but so wide that few hold only a noise's tails.
+_CUBES: Final = 24
 _LEAST_POINTS: Final = 20
 _LARGEST, _SMALLEST = 0.6, 0.005  # extent of what a hand can grasp [m]
 _NEIGHBORS: Final = 12
