@@ -115,7 +115,7 @@ class _Tree:
         if len(moving) > _MOST_JOINTS or longest > _MOST_CHAIN or len(fingers) > _MOST_FINGERS:
             raise InputError(
                 f"{len(moving)} joints in {len(fingers)} chains move below {self.names[palm]}, up to {longest} in one; "
-                f"a hand has up to {_MOST_JOINTS} in {_MOST_FINGERS} fingers of {_MOST_CHAIN}: name the palm with --palm BODY."
+                f"hands have up to {_MOST_JOINTS} in {_MOST_FINGERS} fingers of {_MOST_CHAIN}: name the --palm BODY."
             )
         hinges = [j for j in moving if self.model.jnt_type[j] == self.hinge and self.model.jnt_limited[j]]
         if hinges and all(np.ptp(self.model.jnt_range[j]) < _TINY for j in hinges):
