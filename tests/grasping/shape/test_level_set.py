@@ -22,7 +22,7 @@ def test_a_grid_has_no_more_nodes_than_it_may():
 
 def test_gaps_to_a_grid():
     last = GRID.nodes.max(axis=0)
-    points = np.array([[0.0, 0.0, 0.0], last + [0.0, 0.03, 0.04], GRID.first - [0.01, 0.0, 0.0]])
+    points = np.array([[0.0, 0.0, 0.0], np.add(last, [0.0, 0.03, 0.04]), GRID.first - [0.01, 0.0, 0.0]])
     assert GRID.gap(points) == pytest.approx([0.0, 0.05, 0.01])
 
 
