@@ -153,7 +153,7 @@ def explore(objects, args):
         run = Exploration(problem, belief, NOISE, seed=key["seed"])
         real = problem.on(objects[key["object"]])
         row, cpu = {}, 0.0
-        for k in range(READ_OFF[-1]):
+        for k in range(args.until):
             started = time.process_time()
             x = run.ask()
             touch = touch_trial(real.simulator, problem.pose(x), problem.posture(x))
@@ -252,6 +252,7 @@ def main():
     parser.add_argument("--views", type=int, default=3)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--objects", default=",".join(OBJECTS))
+    parser.add_argument("--until", type=int, default=READ_OFF[-1], help="trials of an exploration")
     parser.add_argument("--training", action="store_true")
     parser.add_argument("--points", type=int, nargs="+", default=[500, 2000, 5000])
     parser.add_argument("--noises", type=float, nargs="+", default=[0.0, 1.0, 3.0])
