@@ -150,7 +150,10 @@ def grasp(
             status=found.status,
             pose=f"palm at ({position}) mm, quaternion ({turn}), {posture_text(found.s1)}",
             details=dict(candidate.details)
-            | {"contacts": str(len(found.contacts)), "touching links": touching_links(found.touching)}
+            | {
+                "contacts": str(len(found.contacts)),
+                "touching links": touching_links(problem.simulator.hand, found.touching),
+            }
             | losses(problem, candidate.x, input_noise, seed)
             | known_at(problem, found.contacts.points)
             | physics,
@@ -273,10 +276,12 @@ def neighbors_of(problem: Any, candidate: Any) -> Any:
     return Neighbors(points, candidate.values < 0.5 * candidate.quality)
 
 
-def touching_links(names: Sequence[str]) -> str:
-    """Return how many links of each finger touch, from names such as "index distal" and "palm"."""
-    counts = Counter(name.partition(" ")[0] for name in names)
-    return ", ".join(f"{finger} {n}" if finger != "palm" else finger for finger, n in counts.items()) or "none"
+def touching_links(hand: Any, names: Sequence[str]) -> str:
+    """Return how many links of each finger touch, such as "index 2, thumb 1, palm"; `names` are those of bodies."""
+    joints = len(hand.link_names) // len(hand.finger_names)
+    finger_of = {name: hand.finger_names[k // joints] for k, name in enumerate(hand.link_names)}
+    counts = Counter(finger_of.get(name, name) for name in dict.fromkeys(names))
+    return ", ".join(f"{name} {n}" if name in hand.finger_names else name for name, n in counts.items()) or "none"
 
 
 def write_grasps(outcomes: Outcomes, report: Any, folder: Path, formats: Sequence[str], words: dict[str, Any]) -> None:
