@@ -1,9 +1,9 @@
 """Do hands from public models grasp? `python -m benchmarks.hands --models FOLDER --rows FILE [--write TABLE.md]`.
 
-For a hand and an object: 120 random poses before its usual facet (along the fingers, across them, standoff, posture), 40 more
-about the best three; of the three best then, the one whose epsilon is highest on average over 20 draws of input noise
-(3 % of each range) is the grasp. It is squeezed, weighed and shaken in MuJoCo, and so are these 20 executions. Where it
-is not held, it is squeezed 2, 4 and 8 times as hard, too.
+For a hand and an object: 300 random poses before its usual facet (dx, dy, dz and s1 of `surehold grasp`, with its
+bounds), 60 more about the best three; of the three best then, the one whose epsilon is highest on average over 20 draws
+of input noise (3 % of each range) is the grasp. It is squeezed, weighed and shaken in MuJoCo, and so are these 20
+executions. Where it is not held, it is squeezed 2, 4 and 8 times as hard, too.
 
 FOLDER holds the models: github.com/dexsuite/dex-urdf as `dex-urdf`, github.com/a-price/robotiq_arg85_description under
 its own name. Hands whose model or package is not there are left out. A row is written for each pair: it goes on where
@@ -23,6 +23,7 @@ from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.synergy import preshape_of
 from surehold.grasping.physics.check import GraspChecker
 from surehold.grasping.physics.explanation import needed_force
+from surehold.grasping.poses import facet_axes
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.problems.grasp.default_poses import default_facet
 
@@ -39,9 +40,8 @@ MODELS = {
     "panda": "",
     "icub-left": "",
 }
-RANGES = np.array([(-0.04, 0.04), (-0.03, 0.03), (-0.015, 0.045)])  # dx, dy, standoff [m]
 NOISE, EXECUTIONS = 0.03, 20
-RANDOM, AROUND, BEST = 120, 40, 3
+RANDOM, AROUND, BEST = 300, 60, 3
 
 
 def hand_of(name, models):
@@ -54,7 +54,10 @@ def row_of(hand, obj):
     """Return the best grasp found and how it does under noise."""
     simulator = Simulator(hand, obj)
     facet = default_facet(simulator.object)
-    ranges = np.vstack([RANGES, preshape_of(hand).s1_useful])
+    along, across, depth = np.abs(facet_axes(facet).T) @ simulator.object.box_half_extents
+    near = depth / 3.0
+    standoffs = (near, near + 0.040 * (1.0 + depth / 0.050))
+    ranges = np.array([(-along - 0.025, along + 0.025), (-across, across), standoffs, preshape_of(hand).s1_useful])
 
     def grasp(unit):
         dx, dy, standoff, s1 = ranges[:, 0] + unit * np.ptp(ranges, axis=1)

@@ -156,6 +156,7 @@ def grasp(
             }
             | losses(problem, candidate.x, input_noise, seed)
             | known_at(problem, found.contacts.points)
+            | (as_measured(problem, candidate) if outcome == "quality" else {})
             | physics,
             scene=replace(drawn(problem, found), neighbors=neighbors_of(problem, candidate)),
         )
@@ -263,6 +264,14 @@ def known_at(problem: Any, points: Any) -> dict[str, str]:
     deviation = float(np.sqrt(np.mean(off**2)))
     advice = "; this side was not seen: scan it, or touch it and give --contacts" if deviation > _UNSEEN else ""
     return {"shape at the contacts": f"known to {1e3 * deviation:.1f} mm{advice}"}
+
+
+def as_measured(problem: Any, candidate: Any) -> dict[str, str]:
+    """Return what measured thresholds say of a candidate's mean under the input noise, where there are any."""
+    from surehold.problems.grasp.measured import threshold_in_words
+
+    words = threshold_in_words(problem, candidate.mean)
+    return {"held, as measured": words} if words else {}
 
 
 def neighbors_of(problem: Any, candidate: Any) -> Any:
