@@ -69,10 +69,9 @@ def lay(page, folder):
         trimesh.creation.icosphere(subdivisions=2, radius=30.0).export(folder / "part.stl")
     if page in ("README.md", "docs/how-to/ros2.md", "docs/how-to/own-hand.md"):
         models = runpy.run_path(str(ROOT / "tests/grasping/hand_models.py"))
-        if page.endswith("own-hand.md"):
-            (folder / "my_hand.urdf").write_text(models["TURNING"])
-        else:
-            (folder / "hand.xml").write_text(models["five_fingers"]())
+        (folder / "my_hand.urdf").write_text(models["TURNING"])
+        (folder / "hand.xml").write_text(models["five_fingers"]())
+        if page.endswith("ros2.md"):
             assert run(["hand", "new", "hand.xml"]) == 0
     if page.endswith("synergies.md"):
         shutil.copy(ROOT / "examples/synergies/icub_postures.csv", folder)
