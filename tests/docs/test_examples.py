@@ -233,6 +233,18 @@ def test_every_block_is_of_a_kind_that_is_checked():
             assert ">>>" in block or "import xopt" in block, f"{name} shows Python that no test runs"
 
 
+def test_files_and_benchmarks_that_pages_name_are_there():
+    seen = 0
+    for name, text in TEXTS.items():
+        for path in re.findall(r"`((?:examples|results|tests|packaging)/[\w./-]+)`", text):
+            assert (ROOT / path).exists(), f"{name} names {path}"
+            seen += 1
+        for benchmark in re.findall(r"python -m benchmarks\.([a-z]\w+)", text):
+            assert (ROOT / "benchmarks" / f"{benchmark}.py").exists(), f"{name} names the benchmark {benchmark}"
+            seen += 1
+    assert seen > 20
+
+
 def test_the_readme_is_short_and_complete():
     text = TEXTS["README.md"]
     assert len(text.splitlines()) <= 120

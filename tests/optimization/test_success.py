@@ -150,7 +150,8 @@ def test_surrogates_of_successes_by_name():
 
 
 @pytest.mark.parametrize(
-    "settings", [{"direction": "minimize"}, {"noise": 0.1}, {"risk": "cvar"}, {"surrogate": "tgp"}]
+    "settings",
+    [{"direction": "minimize"}, {"noise": 0.1}, {"risk": "cvar"}, {"surrogate": "tgp"}, {"failures": "lowest"}],
 )
 def test_settings_without_meaning_are_refused(settings):
     with pytest.raises(InputError, match="cannot be combined with outcome='success'"):

@@ -51,7 +51,8 @@ def check_combination(settings: Mapping[str, Any]) -> None:
     preference = settings["outcome"] == "preference"
     defaults = {
         "direction": "maximize",
-        **({"surrogate": None, "failures": None, "conditions": "commanded"} if preference else {"criterion": None}),
+        "failures": None,
+        **({"surrogate": None, "conditions": "commanded"} if preference else {"criterion": None}),
         "noise": None,
         "output_range": None,
         "risk": "mean",
