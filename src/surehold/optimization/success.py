@@ -52,14 +52,13 @@ def check_combination(settings: Mapping[str, Any]) -> None:
     defaults = {
         "direction": "maximize",
         "failures": None,
-        **({"surrogate": None, "conditions": "commanded"} if preference else {"criterion": None}),
+        **({"surrogate": None, "conditions": "commanded", "constraints": None} if preference else {"criterion": None}),
         "noise": None,
         "output_range": None,
         "risk": "mean",
         "noise_while_exploring": False,
         "trust_region": False,
         "preset": None,
-        "constraints": None,
     }
     for name, value in defaults.items():
         given = settings.get(name, value)
