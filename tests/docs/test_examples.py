@@ -69,10 +69,9 @@ def lay(page, folder):
         trimesh.creation.icosphere(subdivisions=2, radius=30.0).export(folder / "part.stl")
     if page in ("README.md", "docs/how-to/ros2.md", "docs/how-to/own-hand.md"):
         models = runpy.run_path(str(ROOT / "tests/grasping/hand_models.py"))
-        if page.endswith("own-hand.md"):
-            (folder / "my_hand.urdf").write_text(models["TURNING"])
-        else:
-            (folder / "hand.xml").write_text(models["five_fingers"]())
+        (folder / "my_hand.urdf").write_text(models["TURNING"])
+        (folder / "hand.xml").write_text(models["five_fingers"]())
+        if page.endswith("ros2.md"):
             assert run(["hand", "new", "hand.xml"]) == 0
     if page.endswith("synergies.md"):
         shutil.copy(ROOT / "examples/synergies/icub_postures.csv", folder)
@@ -232,6 +231,18 @@ def test_every_block_is_of_a_kind_that_is_checked():
         assert not wrong, f"{name} has blocks of {wrong}"
         for block in blocks(text, "python"):
             assert ">>>" in block or "import xopt" in block, f"{name} shows Python that no test runs"
+
+
+def test_files_and_benchmarks_that_pages_name_are_there():
+    seen = 0
+    for name, text in TEXTS.items():
+        for path in re.findall(r"`((?:examples|results|tests|packaging)/[\w./-]+)`", text):
+            assert (ROOT / path).exists(), f"{name} names {path}"
+            seen += 1
+        for benchmark in re.findall(r"python -m benchmarks\.([a-z]\w+)", text):
+            assert (ROOT / "benchmarks" / f"{benchmark}.py").exists(), f"{name} names the benchmark {benchmark}"
+            seen += 1
+    assert seen > 20
 
 
 def test_the_readme_is_short_and_complete():

@@ -147,6 +147,12 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
         told=told,
     )
     limits = limits_of(s.constraints)
+    for limit in limits:
+        if limit.name in box.names:
+            raise InputError(
+                f"constraint '{limit.name}' is named as a variable of the box: limits of what may be tried are "
+                f"allowed='{limit.name} <= 3' (--allowed), constraints are of further outputs."
+            )
     requirements = None
     if _required(s, region, limits, first):
         requirements = Requirements(
@@ -214,7 +220,7 @@ def _required(s: SimpleNamespace, region: Region | None, limits: tuple[Limit, ..
     """Tell whether these settings require anything of trials and answers."""
     if s.safety is not None and (all(limit.watched for limit in limits) or not len(first)):
         raise InputError(
-            "safety= needs constraints= with a limit, and initial_points= that are known to keep all limits."
+            "safety= needs constraints= with a limit, and initial_points= (--first) that are known to keep all limits."
         )
     if region is None and not limits and not _failures_modelled(s):
         return False

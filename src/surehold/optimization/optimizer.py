@@ -339,11 +339,9 @@ class Optimizer(Record):
                 self._model.execution_noise(self._trials),
                 "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
             )
-            if self.outcome == "success":
-                answer = described(answer, posterior, reached, u)
-            if self._requirements is None:
-                return answer
-            return self._requirements.described(answer, self._trials, u, reached, self._sign)
+            if self._requirements is not None:
+                answer = self._requirements.described(answer, self._trials, u, reached, self._sign)
+            return described(answer, posterior, reached, u) if self.outcome == "success" else answer
 
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the model's mean and standard deviation (q,) at X (q, d) in the box's units.
