@@ -60,12 +60,15 @@ def test_an_exploration(here, capsys):
     assert surehold("explore bottle --trials 2 --out touched") == 0
     out = capsys.readouterr().out
     assert "After 2 touches" in out
+    assert "The grasp it ends with: palm at (" in " ".join(out.split())
     found = json.loads((here / "touched" / "explore.json").read_text())
     assert len(found["trials"]["quality"]) == 2
     assert [row["touches"] for row in found["after"]] == ["0", "2"]
     assert found["after"][0]["best trial"] == "none yet"
     page = (here / "touched" / "explore.html").read_text()
     assert "true shape" in page
+    assert "The grasp it ends with: palm at (" in page
+    assert "What the touches taught" in page
     assert (here / "touched" / "shape.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -134,7 +137,7 @@ def of_the_hand(points, camera):
         (not_numbers, "has 0 finite points; give 20 or more"),
         (on_a_line, "a surface is needed: check the columns"),
         (two_objects, "give one of them"),
-        (millimeters, "give --unit mm"),
+        (millimeters, "unit of its numbers: --unit mm"),
         (of_the_hand, "take out those of the hand that carries the camera"),
     ],
 )
