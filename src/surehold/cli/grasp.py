@@ -148,9 +148,13 @@ def grasp(
             status=found.status,
             pose=pose_text(found),
             details=dict(candidate.details)
-            | {"contacts": str(len(found.contacts)), "touching links": touching_links(found.touching)}
+            | {
+                "contacts": str(len(found.contacts)),
+                "touching links": touching_links(problem.simulator.hand, found.touching),
+            }
             | losses(problem, candidate.x, input_noise, seed)
             | known_at(problem, found.contacts.points)
+            | (as_measured(problem, candidate) if outcome == "quality" else {})
             | physics,
             scene=replace(drawn(problem, found), neighbors=neighbors_of(problem, candidate)),
         )
@@ -263,6 +267,14 @@ def known_at(problem: Any, points: Any) -> dict[str, str]:
     return {"shape at the contacts": f"known to {1e3 * deviation:.1f} mm{advice}"}
 
 
+def as_measured(problem: Any, candidate: Any) -> dict[str, str]:
+    """Return what measured thresholds say of a candidate's mean under the input noise, where there are any."""
+    from surehold.problems.grasp.measured import threshold_in_words
+
+    words = threshold_in_words(problem, candidate.mean)
+    return {"held, as measured": words} if words else {}
+
+
 def neighbors_of(problem: Any, candidate: Any) -> Any:
     """Return where the hand's grasp center was in a candidate's re-queries, and which were worth less than half."""
     from surehold.reports.run_report import Neighbors
@@ -274,10 +286,12 @@ def neighbors_of(problem: Any, candidate: Any) -> Any:
     return Neighbors(points, candidate.values < 0.5 * candidate.quality)
 
 
-def touching_links(names: Sequence[str]) -> str:
-    """Return how many links of each finger touch, from names such as "index distal" and "palm"."""
-    counts = Counter(name.partition(" ")[0] for name in names)
-    return ", ".join(f"{finger} {n}" if finger != "palm" else finger for finger, n in counts.items()) or "none"
+def touching_links(hand: Any, names: Sequence[str]) -> str:
+    """Return how many links of each finger touch, such as "index 2, thumb 1, palm"; `names` are those of bodies."""
+    joints = len(hand.link_names) // len(hand.finger_names)
+    finger_of = {name: hand.finger_names[k // joints] for k, name in enumerate(hand.link_names)}
+    counts = Counter(finger_of.get(name, name) for name in dict.fromkeys(names))
+    return ", ".join(f"{name} {n}" if name in hand.finger_names else name for name, n in counts.items()) or "none"
 
 
 def write_grasps(outcomes: Outcomes, report: Any, folder: Path, formats: Sequence[str], words: dict[str, Any]) -> None:

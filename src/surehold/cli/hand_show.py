@@ -52,7 +52,8 @@ def shown_hand(hand: Any, out: str, open_page: bool, console: Any) -> None:
 
 def _facts(hand: Any) -> list[tuple[str, str]]:
     center = ", ".join(f"{1e3 * c:.0f}" for c in hand.grasp_center)
-    facts = [("grasp center", f"({center}) mm"), ("force of a finger", f"{hand.finger_force:g} N")]
+    source = f" ({hand.sources['finger_force']})" if "finger_force" in hand.sources else ""
+    facts = [("grasp center", f"({center}) mm"), ("force of a finger", f"{hand.finger_force:g} N{source}")]
     if hand.friction is not None:
         facts.append(("friction", f"{hand.friction:g}"))
     if hand.model is not None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
+from scipy.optimize import linprog, lsq_linear
 
 from surehold.grasping import Simulator, default_pose
 from surehold.grasping.physics.check import GraspChecker
@@ -27,15 +27,11 @@ def limits_of(checker):
     return checker.drives.largest * moving.reshape(checker.drives.limits.shape)
 
 
-def test_forces_of_the_cones_explain_the_torques_and_balance(checker):
-    """Of the torques found, a linear program finds forces that balance to rounding; MuJoCo gives the Jacobians."""
+def edges_of(checker, grasp):
+    """Return wrenches (m, 6) and torques of the joints (m, a) of the friction cones' edges, by MuJoCo's Jacobians."""
     import mujoco
 
-    grasp, simulator, limits = bottle_grasp(checker), checker.simulator, limits_of(checker)
-    shares, residual = balanced_torques(simulator, grasp, limits)
-    assert np.abs(shares).max() == pytest.approx(1.0)
-    assert residual < 1e-3
-    assert not shares[limits == 0.0].any()
+    simulator, limits = checker.simulator, limits_of(checker)
     contacts = simulator.contacts_at(grasp.pose, grasp.joints)
     near = contacts.weights > 0.5
     points, normals, bodies = contacts.points[near], contacts.normals[near], contacts.bodies[near]
@@ -50,7 +46,7 @@ def test_forces_of_the_cones_explain_the_torques_and_balance(checker):
     mujoco.mj_setState(checker.model, data, checker._state(grasp), mujoco.mjtState.mjSTATE_FULLPHYSICS)
     mujoco.mj_forward(checker.model, data)
     palm = grasp.pose.inverse()
-    joints, torque_rows = limits.shape[1], []
+    joints, torques = limits.shape[1], []
     for place, force, body in zip(
         np.repeat(palm.apply(points), 8, axis=0), wrenches[:, :3] @ palm.rotation.T, np.repeat(bodies, 8), strict=True
     ):
@@ -58,17 +54,44 @@ def test_forces_of_the_cones_explain_the_torques_and_balance(checker):
         if body < limits.size:
             number = checker.model.body(f"{body // joints} {body % joints}").id
             mujoco.mj_jac(checker.model, data, jacobian, None, place, number)
-        torque_rows.append(force @ jacobian[:, : len(checker._moving)])
+        torques.append(force @ jacobian[:, : len(checker._moving)])
+    return wrenches, np.array(torques)
+
+
+def test_forces_of_the_cones_explain_the_torques_and_balance(checker):
+    """Of the torques found, a linear program finds forces that balance to rounding; MuJoCo gives the Jacobians."""
+    grasp, limits = bottle_grasp(checker), limits_of(checker)
+    shares, residual = balanced_torques(checker.simulator, grasp, limits)
+    assert np.abs(shares).max() == pytest.approx(1.0)
+    assert residual < 1e-3
+    assert not shares[limits == 0.0].any()
+    wrenches, torques = edges_of(checker, grasp)
     wanted = (shares * limits).ravel()[checker._moving]
-    scale = wrenches.shape[0]
     found = linprog(
-        np.zeros(scale),
-        A_ub=np.vstack([wrenches.T, -wrenches.T, np.transpose(torque_rows), -np.transpose(torque_rows)]),
+        np.zeros(len(wrenches)),
+        A_ub=np.vstack([wrenches.T, -wrenches.T, torques.T, -torques.T]),
         b_ub=np.concatenate([np.full(12, 0.05), wanted + 1e-6, 1e-6 - wanted]),
         bounds=(0.0, None),
     )
     assert found.status == 0, "forces within the cones, of a net wrench below 0.05 N, ask for these torques"
     assert found.x.sum() > 5.0, "and press with newtons"
+
+
+def test_the_torques_are_those_of_the_program_that_is_stated(checker):
+    """Strain and evenness under balance, by another solver, and with MuJoCo's Jacobians."""
+    grasp, limits = bottle_grasp(checker), limits_of(checker)
+    wrenches, torques = edges_of(checker, grasp)
+    strains = torques.T / limits.ravel()[checker._moving][:, None]
+    of_contact = np.kron(np.eye(len(wrenches) // 8), np.ones(8))
+    rows = [strains / np.abs(strains).max(), np.sqrt(len(of_contact)) * of_contact]
+    rows += [1000.0 * wrenches.T, np.full((1, len(wrenches)), 1000.0)]
+    goal = np.zeros(sum(map(len, rows)))
+    goal[-1] = 1000.0
+    x = lsq_linear(np.vstack(rows), goal, (0.0, np.inf), method="bvls", tol=1e-12).x
+    expected = strains @ x
+    shares, _ = balanced_torques(checker.simulator, grasp, limits)
+    np.testing.assert_allclose(shares.ravel()[checker._moving], expected / np.abs(expected).max(), atol=1e-4)
+    assert (of_contact @ x > 1e-6).mean() > 0.5, "most contacts press, not the few that balance needs"
 
 
 def test_torques_grow_with_the_limits_in_proportion(checker):

@@ -78,7 +78,10 @@ def built_hand(rest: RestingModel, file: str) -> Hand:
         finger_force=config.finger_force,
         friction=config.friction,
         model=rest.source(file),
-        sources={str(number): source for number, source in config.sources.items()},
+        sources={
+            **({} if "finger_force" in config.model_fields_set else {"finger_force": "assumed"}),
+            **config.sources,
+        },
     )
 
 

@@ -2,17 +2,20 @@
 
     W    wrenches of the friction cones' edges at the contacts, in units of force, (m, 6)
     x    how much of each edge, >= 0 and of sum 1, (m,): the normal forces add up to 1
+    N    which edges are those of a contact: N x are the normal forces, (n, m)
     T    torques of the joints per unit of each edge (J' f), divided by the largest that each joint can exert, (k, m)
 
 Five fingers that all push as hard as they can carry off what they hold: four of them are stronger than a thumb. A hand
-that feels its contacts and commands torques squeezes with forces that balance. Of these the joints take the torques
-that strain them least,
+that feels its contacts and commands torques squeezes with forces that balance. Of these the joints take torques that
+strain them little, and the skin presses as evenly as that leaves,
 
-    min over x  |T x|^2 + B^2 (|W' x|^2 + (sum x - 1)^2),  B large,
+    min over x  |T x|^2 / max T^2 + n |N x|^2 + B^2 (|W' x|^2 + (sum x - 1)^2),  B large,
 
-a nonnegative least-squares problem whose torques T x are unique even where the forces are not. Contacts without balance
-get the forces that leave the least wrench. Then all are scaled until the first joint is at its limit. Bilevel grasp
-synthesis squeezes in the same way (Chen et al. 2024, BODex); internal forces: Kerr and Roth 1986.
+a nonnegative least-squares problem whose T x and N x are unique. Least strain alone puts all force on as few of a
+hundred contacts as balance needs, and where it passes the joints at a small lever: rigid links touch somewhere beside,
+and the object slips away. Contacts without balance get the forces that leave the least wrench. Then all are scaled
+until the first joint is at its limit. Bilevel grasp synthesis squeezes in a similar way (Chen et al. 2024, BODex);
+internal forces: Kerr and Roth 1986.
 """
 
 from typing import Final
@@ -73,8 +76,10 @@ def balanced_torques(simulator: Simulator, grasp: Grasp, limits: Array) -> tuple
     frames = link_frames(hand.bases, hand.chains, np.ascontiguousarray(grasp.joints))
     of_edge = np.repeat(np.arange(len(points)), per_contact)
     strain = _strains(hand.chains, frames, limits, places[of_edge], forces, bodies[of_edge])
-    heavy = _BALANCE * (np.abs(strain).max() or 1.0)
-    system = np.vstack([strain, heavy * wrenches.T, np.full(len(wrenches), heavy)])
+    most = np.abs(strain).max() or 1.0
+    even = most * np.sqrt(len(points)) * np.repeat(np.eye(len(points)), per_contact, axis=1)
+    heavy = _BALANCE * most
+    system = np.vstack([strain, even, heavy * wrenches.T, np.full(len(wrenches), heavy)])
     goal = np.zeros(len(system))
     goal[-1] = heavy
     x, _ = nnls(system, goal, maxiter=30 * len(wrenches))
