@@ -8,9 +8,9 @@ shape    distance of the true surface to the one believed [mm], mean and 95 %, o
          chosen on these
 grasp    a grasp is planned on a half view (1,000 points, 1 mm): on 8 draws of the shape, on the mean surface alone, and
          on the cloud mirrored and believed; then it is queried 200 times on the true shape under input noise
-explore  from a box: the true worth of the answer after 20, 40 and 80 trials
+explore  from a box: the true worth of the answer after 10, 20, 40, 50 and 80 trials
 search   the same of optimization that learns no shape, and after 100 trials
-time     of an update of the shape with 200 contacts
+time     of an update of the shape in an exploration that has made 200 contacts
 
 Every finished case is a line of the rows' file: a benchmark that is stopped goes on where it was. Cases are numbered by
 `--views`, from `--first`; cameras look from the side or from above, 5 to 50 degrees.
@@ -40,8 +40,9 @@ from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.grasp.touch import touch_trial
 
 NOISE = sh.InputNoise.unit(0.03)
+SEVEN = ("dx", "dy", "dz", "rx", "ry", "rz", "s1")
 TRIALS, INITIAL = 30, 15
-READ_OFF = (20, 40, 80)  # trials after which an exploration is asked for its answer
+READ_OFF = (10, 20, 40, 50, 80)  # trials after which an exploration is asked for its answer
 
 
 def solid_object(name, solids):
@@ -152,7 +153,7 @@ def explore(objects, args):
         run = Exploration(problem, belief, NOISE, seed=key["seed"])
         real = problem.on(objects[key["object"]])
         row, cpu = {}, 0.0
-        for k in range(READ_OFF[-1]):
+        for k in range(args.until):
             started = time.process_time()
             x = run.ask()
             touch = touch_trial(real.simulator, problem.pose(x), problem.posture(x))
@@ -186,8 +187,7 @@ def explored(objects, args):
             key = {"object": name, "seed": seed}
             if not known(args, key):
                 belief = belief_of_box(obj)
-                variables = ("dx", "dy", "dz", "rx", "ry", "rz", "s1")
-                yield key, GraspProblem(belief.mean_object(), variables=variables), belief
+                yield key, GraspProblem(belief.mean_object(), variables=SEVEN), belief
 
 
 def worth(real, x):
@@ -197,20 +197,26 @@ def worth(real, x):
 def timed(objects, args):
     for name, obj in objects.items():
         belief = belief_of_box(obj)
-        places, normals = surface_points(obj, 200, np.random.default_rng(0))
-        told = Observations(places, np.zeros(200), np.full(200, 5e-4), places, normals, np.full(200, 0.15))
-        run = Exploration(GraspProblem(obj), belief, NOISE)
-        run.tell(GraspProblem(obj).box.lower, 0.0, told)
-        one = replace(told, **{key: getattr(told, key)[:1] for key in ("points", "values", "noise")})
-        one = replace(one, **{key: getattr(told, key)[:1] for key in ("slope_points", "slopes", "slope_noise")})
-        best = np.inf
-        for _ in range(5):
+        problem = GraspProblem(belief.mean_object(), variables=SEVEN)
+        real, run = problem.on(obj), Exploration(problem, belief, NOISE, seed=args.first)
+        while len(run.belief.surface.observations.slopes) < 200:
+            x = run.ask()
+            touch = touch_trial(real.simulator, problem.pose(x), problem.posture(x))
+            run.tell(x, touch.grasp.quality, touch.observations)
+        times = []
+        for _ in range(15):
             started = time.process_time()
-            run.tell(GraspProblem(obj).box.lower, 0.0, one)
-            update = time.process_time() - started
-            field = run.belief.mean_object()
-            best = min(best, time.process_time() - started)
-        print(f"{name}: surface {1e3 * update:.0f} ms, with its distances and mesh {1e3 * best:.0f} ms CPU", field.name)
+            run.tell(x, 0.0, Observations())
+            learnt = time.process_time()
+            run.belief.mean_object()
+            times.append((1e3 * (learnt - started), 1e3 * (time.process_time() - learnt)))
+        (surface, shape), known = np.median(times, axis=0), run.belief.surface.observations
+        memory = (run.belief.surface.factor.nbytes + run.belief.mean_object().distances.nodes.nbytes) / 2**20
+        print(
+            f"{name}: {len(run.X) - 15} touches, {len(known.slopes)} contacts, {len(known.points)} values, "
+            f"{np.prod(run.belief.grid.shape)} nodes: surface {surface:.0f} ms, distances and mesh {shape:.0f} ms, "
+            f"together {surface + shape:.0f} ms of CPU; factor and distances {memory:.0f} MiB"
+        )
 
 
 def read(args):
@@ -246,13 +252,16 @@ def main():
     parser.add_argument("--views", type=int, default=3)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--objects", default=",".join(OBJECTS))
+    parser.add_argument("--until", type=int, default=READ_OFF[-1], help="trials of an exploration")
     parser.add_argument("--training", action="store_true")
     parser.add_argument("--points", type=int, nargs="+", default=[500, 2000, 5000])
     parser.add_argument("--noises", type=float, nargs="+", default=[0.0, 1.0, 3.0])
     parser.add_argument("--spread", type=float, default=SPREAD[0])
     parser.add_argument("--length", type=float, default=SPREAD[1])
     args = parser.parse_args()
-    objects = training_objects() if args.training else {n: shipped_object(n) for n in args.objects.split(",")}
+    objects = own = training_objects()
+    if not args.training:
+        objects = {name: own[name] if name in own else shipped_object(name) for name in args.objects.split(",")}
     with threadpool_limits(1):
         {"shape": shape, "grasp": grasp, "explore": explore, "search": search, "time": timed}[args.what](objects, args)
 

@@ -12,6 +12,7 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
 
 import pages  # noqa: E402  (beside this file)
+import reports  # noqa: E402
 
 import surehold  # noqa: E402
 
@@ -35,6 +36,8 @@ extensions = [
 exclude_patterns = [
     "generated/gallery/**/*.ipynb",
     "generated/gallery/**/*.py",
+    "generated/cards.md",  # included
+    "generated/pages/**",
     "**/sg_execution_times.rst",
     "sg_execution_times.rst",
 ]
@@ -48,6 +51,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"surehold {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_extra_path = ["generated/pages"]
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {
@@ -107,7 +111,19 @@ def math_renderer(self, node: nodes.Element) -> None:
 html_math_renderer = "mathml"
 
 
-def setup(app: Sphinx) -> None:
+def keep_together(app: Sphinx, name: str, source: list[str]) -> None:
+    """Break no line between a number and its error."""
+    source[0] = source[0].replace(" ± ", "\u00a0±\u00a0")
+
+
+def write(app: Sphinx, config: object) -> None:
     """Write the generated pages before any is read."""
+    pages.write(DOCS / "generated")
+    reports.write(DOCS / "generated")
+
+
+def setup(app: Sphinx) -> None:
+    """Add what Sphinx does not do by itself."""
     app.add_html_math_renderer("mathml", (math_renderer, None), (math_renderer, None))
-    app.connect("config-inited", lambda app, config: pages.write(DOCS / "generated"))
+    app.connect("config-inited", write)
+    app.connect("source-read", keep_together)

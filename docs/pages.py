@@ -38,7 +38,7 @@ Made from `results/benchmarks/{name}`, which `make bench` stored on {machine}; {
 one core, or wall seconds where several processes work. *Asked* is what each row was meant to take at most: of asks a
 share of the time of Optuna's GPSampler and of BoTorch in the same run, of others a fixed time. The *floor* is the least
 that has to be done: LAPACK's factorization of the trials' matrix (asks), a copy of the trials in memory (studies), one
-look at the distance field (grasps). The yardstick of the machine, took {yardstick:.3f} ms (dpotrf of
+look at the distance field (grasps). The yardstick of the machine took {yardstick:.3f} ms (dpotrf of
 140 x 140).
 """
 
@@ -103,10 +103,19 @@ def _speed() -> str:
 
 def _reference(package: str, about: str) -> str:
     module = importlib.import_module(package)
-    groups: dict[str, list[str]] = {"Classes": [], "Functions": [], "Constants": []}
+    groups: dict[str, list[str]] = {"Classes": [], "Functions": [], "Errors": [], "Constants": []}
     for name in public_names(package):
         value = getattr(module, name)
-        kind = "Classes" if inspect.isclass(value) else "Functions" if callable(value) else "Constants"
+        raised = inspect.isclass(value) and issubclass(value, Exception)
+        kind = (
+            "Errors"
+            if raised
+            else "Classes"
+            if inspect.isclass(value)
+            else "Functions"
+            if callable(value)
+            else "Constants"
+        )
         groups[kind].append(name)
     parts = [package, "=" * len(package), "", about, "", f".. currentmodule:: {package}", ""]
     for title, names in groups.items():

@@ -249,6 +249,9 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("tell mug 0 1e308", "another unit"),
         ("tell mug 0 1" + "0" * 5000, "finite"),
         ("serve mug --port 70000", "65535"),
+        ("create new --parameters x=0:1 --outcome success --direction minimize", "success is maximized"),
+        ("create new --parameters x=0:1 --constraint f<=1 --safety 0.9", r"needs constraints= .*\(--first\)"),
+        ("create new --parameters x=0:1 --constraint x<=0.5", r"allowed='x <= 3' \(--allowed\)"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(line, message, capsys):
@@ -412,3 +415,21 @@ def test_counts_of_successes(study, capsys):
     assert header.startswith("id,state,value,of,x,")
     assert first.startswith("0,complete,0.7,10,")
     assert second.startswith("1,complete,0.75,4,0.5,")
+    study("add rig 200/200 --at x=0.6")
+    sure = study("recommend rig")["sure"]
+    assert 0.0 < sure["0.99"] < sure["0.9"] < 1.0
+    assert run(["study", "recommend", "rig"]) == 0
+    expected = "% of executions succeed; 95% sure of at least"
+    told = capsys.readouterr().out
+    assert expected in told
+    assert f"{sure['0.9']:.0%} sure of at least 90%" in told
+
+
+def test_an_output_that_could_not_be_measured(study):
+    study("create press --parameters x=0:1 --constraint force<=0.5")
+    study("ask press")
+    assert "(--constraints force=VALUE)" in study("tell press 0 0.3", code=2)
+    assert "force=none" in study("tell press 0 0.3 --constraints force=much", code=2)
+    study("tell press 0 0.3 --constraints force=none")
+    study("add press 0.2 --at x=0.4 --constraints force=0.1")
+    assert study("recommend press")["trial"] == 1

@@ -7,6 +7,7 @@ import pytest
 
 from surehold.cli import run
 from surehold.errors import InputError
+from surehold.grasping.object.distance_field import distance_field_of
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.shape.views import camera_towards, half_view
 
@@ -60,12 +61,15 @@ def test_an_exploration(here, capsys):
     assert surehold("explore bottle --trials 2 --out touched") == 0
     out = capsys.readouterr().out
     assert "After 2 touches" in out
+    assert "The grasp it ends with: palm at (" in " ".join(out.split())
     found = json.loads((here / "touched" / "explore.json").read_text())
     assert len(found["trials"]["quality"]) == 2
     assert [row["touches"] for row in found["after"]] == ["0", "2"]
     assert found["after"][0]["best trial"] == "none yet"
     page = (here / "touched" / "explore.html").read_text()
     assert "true shape" in page
+    assert "The grasp it ends with: palm at (" in page
+    assert "What the touches taught" in page
     assert (here / "touched" / "shape.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -134,7 +138,7 @@ def of_the_hand(points, camera):
         (not_numbers, "has 0 finite points; give 20 or more"),
         (on_a_line, "a surface is needed: check the columns"),
         (two_objects, "give one of them"),
-        (millimeters, "give --unit mm"),
+        (millimeters, "unit of its numbers: --unit mm"),
         (of_the_hand, "take out those of the hand that carries the camera"),
     ],
 )
@@ -160,6 +164,13 @@ def test_contacts_that_contradict_a_cloud_or_themselves_are_refused(here, capsys
         place = file["points"][0].tolist()
     assert "normals 180 degrees" in told([{"point": place, "normal": [v, 0, 0]} for v in (1, -1)])
     assert "mm off the surface" in told([{"point": [0.0, 0.0, 0.6], "normal": [0, 0, 1]}])
+    bottle = shipped_object("bottle")
+    seen = camera_towards(bottle, 0.5, 0.3, 0.02)  # beside its axis, on the camera's side
+    field = distance_field_of(bottle)
+    outward = field.gradient(seen[None])[0]
+    seen = seen - field.distance(seen[None])[0] * outward
+    contact = {"point": seen.tolist(), "normal": (-outward).tolist()}
+    assert "its normal points into the object" in told([contact])
 
 
 def test_a_robot_tells_contacts_and_the_next_trial_follows_from_them(here, capsys):

@@ -106,6 +106,8 @@ def test_safe_mode_stays_within_the_limit_and_still_improves():
 
 
 def test_safe_mode_needs_a_safe_beginning():
+    with pytest.raises(InputError, match=r"is named as a variable .*allowed="):
+        Optimizer(BOX, constraints={BOX.names[0]: (None, 1.0)})
     with pytest.raises(InputError, match="needs constraints= with a limit, and initial_points="):
         Optimizer(BOX, constraints={"c": (None, 1.0)}, safety=0.9)
     optimizer = Optimizer(BOX, constraints={"c": (None, 1.0)}, safety=0.9, initial_points=[[0.5, 0.5]])

@@ -112,7 +112,8 @@ def test_parallel_trials_differ():
         ({"success": 1}, "success is 1; give True or False"),
         ({"success": "yes"}, "give True or False"),
         ({"successes": 11, "of": 10}, "successes are 11 of 10"),
-        ({"successes": 3}, "nothing was told"),
+        ({"successes": 3}, "successes are 3 of None; tell both"),
+        ({"of": 3}, "successes are None of 3; tell both"),
         ({}, "nothing was told"),
         ({"successes": -1, "of": 4}, "successes is -1"),
         ({"successes": 0, "of": 0}, "of is 0"),
@@ -149,7 +150,8 @@ def test_surrogates_of_successes_by_name():
 
 
 @pytest.mark.parametrize(
-    "settings", [{"direction": "minimize"}, {"noise": 0.1}, {"risk": "cvar"}, {"surrogate": "tgp"}]
+    "settings",
+    [{"direction": "minimize"}, {"noise": 0.1}, {"risk": "cvar"}, {"surrogate": "tgp"}, {"failures": "lowest"}],
 )
 def test_settings_without_meaning_are_refused(settings):
     with pytest.raises(InputError, match="cannot be combined with outcome='success'"):
@@ -264,3 +266,34 @@ def test_of_many_successes_the_early_ones_are_not_all_that_is_looked_at():
 def test_surrogates_that_do_not_fit_the_outcome_are_refused(settings, message):
     with pytest.raises(InputError, match=message):
         sh.Optimizer(BOX, **settings)
+
+
+@pytest.mark.parametrize("surrogate", ["probit", "beta_process"])
+def test_limits_of_further_outputs_are_kept_under_the_noise(surrogate):
+    """Success is likeliest at (.8, .5), where the torque is beyond its limit."""
+    box, noise = sh.Box.unit(2), sh.InputNoise.unit(0.03)
+    settings = {"constraints": {"torque": (None, 0.6)}, "surrogate": surrogate, "input_noise": noise}
+    optimizer, rng = sh.Optimizer(box, outcome="success", seed=1, **settings), np.random.default_rng(1)
+    for _ in range(30):
+        x = optimizer.ask()
+        held = rng.random() < np.exp(-8.0 * ((x - (0.8, 0.5)) ** 2).sum())
+        optimizer.tell(x, success=bool(held), constraints={"torque": x[0]})
+    best = optimizer.recommend()
+    executions = best.x + rng.normal(0.0, 0.03, (4000, 2))
+    assert np.mean(executions[:, 0] <= 0.6) > 0.9
+    assert best.x[0] > 0.45, "no farther from the limit than the noise asks for"
+    assert best.feasible >= 0.95
+    assert best.outputs["torque"].mean == pytest.approx(best.x[0], abs=0.02)
+    optimizer.tell([0.1, 0.1], failed=True)
+    assert (optimizer.y[-1], np.isnan(optimizer.outputs["torque"][-1])) == (0.0, True)
+    with pytest.raises(InputError, match="says nothing about 'torque'"):
+        optimizer.tell([0.2, 0.1], success=False)
+
+
+def test_a_function_gives_success_and_outputs():
+    result = sh.maximize(
+        lambda x: (bool(x[0] > 0.2), {"torque": float(x[0])}), BOX, 12, outcome="success", seed=0,
+        constraints={"torque": (None, 0.5)},
+    )  # fmt: skip
+    assert 0.2 < result.recommendation.x[0] <= 0.5
+    assert result.to_dataframe()["torque"].to_numpy() == pytest.approx(result.X[:, 0])

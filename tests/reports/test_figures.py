@@ -4,7 +4,8 @@ from dataclasses import replace
 import numpy as np
 
 from surehold.reports import figures
-from surehold.reports.drawing import PALETTE
+from surehold.reports.drawing import PALETTE, marked
+from surehold.reports.page import render
 
 
 def test_every_figure_is_drawn(gm_report, rkhs_report):
@@ -107,3 +108,19 @@ def test_all_failed_but_one(gm_report):
     best[-1] = 1.0
     for figure in figures.figures(replace(gm_report, y=y, best_trace=best)).values():
         assert figures.png_bytes(figure)
+
+
+def test_trials_that_did_not_succeed_are_crossed(gm_report):
+    y = np.arange(gm_report.y.size) % 3 / 2.0  # 0, 1/2 and 1 of two executions
+    y[4] = np.nan
+    counted = replace(gm_report, y=y, counted=True)
+    marks = marked(counted)
+    assert np.array_equal(np.flatnonzero(marks["trials-failed"]), np.flatnonzero(~(y >= 0.5)))
+    assert not np.any(marks["trials-failed"] & (marks["trials-initial"] | marks["trials-later"]))
+    (cross,) = (
+        c for c in figures.figures(counted)["surface_mean"].axes[0].collections if c.get_gid() == "trials-failed"
+    )
+    assert len(cross.get_offsets()) == marked(counted, counted.surfaces[0])["trials-failed"].sum()
+    assert "did not succeed</li>" in render(counted)
+    assert "failed trial</li>" in render(replace(gm_report, y=np.where(marks["trials-failed"], np.nan, gm_report.y)))
+    assert "</span> failed trial</li>" not in render(gm_report)

@@ -16,8 +16,10 @@ from surehold.studies.robot import RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.service import service
 from surehold.studies.settings import StudySettings
+from surehold.studies.status import rows, to_csv
 from surehold.studies.stop_rule import StopRule
 from surehold.studies.trial_function import trial_function
+from surehold.studies.warm_start import import_trials, trials_of_csv, trials_of_study
 from surehold.studies.worker import work
 
 TOKEN = "0123456789abcdef0123"
@@ -262,3 +264,32 @@ def test_first_points_and_safety_on_the_command_line(tmp_path, monkeypatch, caps
     line = "maximize rig.py:hill --bounds x=0:1 --method bo --noise none --trials 6 --initial 4 --out out"
     assert run([*line.split(), "--failures", "lowest", "--first", "x=0.55"]) == 0
     assert json.loads((tmp_path / "out" / "result.json").read_text())["trials"]["x"][0] == [0.55]
+
+
+def test_outputs_survive_export_and_import(study, tmp_path):
+    at = {"a": 0.25, "b": 1.0, "n": 2}
+    study.add(at, 0.5, constraints={"torque": 2.25, "temperature": 21.0})
+    study.add(at | {"a": 0.5}, 0.75, constraints={"torque": None})
+    study.add(at | {"a": 0.75}, failed=True)
+    (tmp_path / "trials.csv").write_text(to_csv(study))
+    plain = to_csv(study).replace("output_torque", "torque")
+    (tmp_path / "plain.csv").write_text(plain)
+    (tmp_path / "none.csv").write_text(plain.replace("torque", "force"))
+    names, outputs = {name: name for name in at}, ["torque", "temperature"]
+    told = [(2.25, 21.0), (None, None), (None, None)]
+    assert [(row["output_torque"], row["output_temperature"]) for row in rows(study)] == told
+    for name, found in (
+        ("csv", trials_of_csv(str(tmp_path / "trials.csv"), names, outputs=outputs)),
+        ("plain", trials_of_csv(str(tmp_path / "plain.csv"), names, outputs=outputs)),
+        ("study", trials_of_study(study.study, names, "maximize", outputs)),
+    ):
+        other = RobotStudy.create(name, study.settings, str(tmp_path / f"{name}.log"))
+        assert import_trials(other, found) == []
+        assert [(row["output_torque"], row["output_temperature"]) for row in rows(other)] == told
+        other.close()
+    other = RobotStudy.create("none", study.settings, str(tmp_path / "none.log"))
+    with pytest.raises(InputError, match=r"line 2: the trial says nothing about 'torque'.*Nothing was imported"):
+        import_trials(other, trials_of_csv(str(tmp_path / "none.csv"), names, outputs=outputs))
+    assert run(["study", "import", "none", str(tmp_path / "trials.csv"), "--storage", other.storage.url]) == 0
+    assert [row["value"] for row in rows(other)] == [0.5, 0.75, None]
+    other.close()

@@ -149,3 +149,8 @@ def test_bounds_in_single_precision_are_the_bounds():
     single = float(np.float32(0.05))
     assert single > 0.05
     assert SearchSpace({"dx": (-0.05, 0.05)}).check({"dx": single}) == {"dx": 0.05}
+
+
+def test_a_study_does_not_choose_what_nobody_sets():
+    with pytest.raises(InputError, match=r"uncontrolled: payload.*take a surehold\.Optimizer"):
+        SearchSpace(sh.Box({"grip": (0.0, 1.0)}, uncontrolled={"payload": [0.2, 0.3, 0.8]}))

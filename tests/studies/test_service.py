@@ -118,7 +118,10 @@ def test_counts_of_successes(tmp_path):
     assert taken == {"id": id, "state": "complete", "value": 0.7, "already": False, "of": 10}
     at = {"parameters": {"dx": 0.0, "dy": 0.0}, "successes": 2, "of": 4}
     client.post("/studies/held/add", json=at)
-    assert [(t["value"], t["of"]) for t in client.get("/studies/held/trials").json()] == [(0.7, 10), (0.5, 4)]
+    for told in (True, False):
+        client.post("/studies/held/add", json={"parameters": {"dx": 0.01, "dy": 0.0}, "value": told})
+    trials = client.get("/studies/held/trials").json()
+    assert [(trial["value"], trial["of"]) for trial in trials] == [(0.7, 10), (0.5, 4), (1.0, 1), (0.0, 1)]
 
 
 BAD_BODIES = [

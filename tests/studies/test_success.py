@@ -145,3 +145,22 @@ def test_foreign_attributes_of_executions_count_as_one(tmp_path):
         study.study.tell(trial, 1.0)
     history = history_of(study.trials(), study.settings.space)
     assert history.executions.tolist() == [1] * 5
+
+
+def test_success_within_limits(tmp_path):
+    study = created(tmp_path, outcome="success", n_initial=5, constraints={"force": [None, 0.5]})
+    optimizer = Optimizer(
+        Box({"x": (0.0, 1.0)}), outcome="success", n_initial=5, seed=0, constraints={"force": (None, 0.5)}
+    )
+    for _ in range(7):
+        asked, trial = study.ask(), optimizer.ask_trial()
+        assert asked.parameters == pytest.approx(trial.parameters, abs=1e-9)
+        x = asked.parameters["x"]
+        study.tell(asked.id, f"{hill(x)}/10", constraints={"force": x})
+        optimizer.tell(trial, successes=hill(x), of=10, constraints={"force": x})
+    best = study.recommend()
+    assert best.parameters["x"] <= 0.5
+    assert best.feasible == pytest.approx(optimizer.recommend().feasible, abs=1e-6)
+    assert best.outputs["force"] == pytest.approx(best.parameters["x"], abs=0.01)
+    study.tell(study.ask().id, failed=True)
+    assert len(study.trials()) == 8

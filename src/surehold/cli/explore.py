@@ -93,6 +93,7 @@ def explore(
     path = run.write(folder)
     if interrupted:
         console.print(f"Interrupted after {len(run.exploration.X)} of {trials} touches; keeping what was done.")
+    console.print(run.answered(), markup=False)
     console.print(f"Page: {path}", markup=False, soft_wrap=True)
     if open_page:
         webbrowser.open(path.resolve().as_uri())
@@ -156,6 +157,7 @@ class _Run:
         self.notes: list[str] = []
         self.rows: list[tuple[str, ...]] = []
         self.answer: Any = None
+        self.true = 0.0  # worth of the answer
 
     def touch(self) -> None:
         """Make a trial."""
@@ -179,7 +181,7 @@ class _Run:
         error = 1e3 * np.abs(distance_field_of(mean).distance(self._places))
         deviation = belief.surface.deviation(mean.vertices)
         self.answer = self.exploration.recommend()
-        true = robust_score(self.real, self.answer.x, self.noise, n=50).mean
+        self.true = robust_score(self.real, self.answer.x, self.noise, n=50).mean
         tried = float(self.exploration.y.max()) if n else np.nan
         beside = (2.4 * float(self.body.box_half_extents[0]) + 0.04, 0.0, 0.0)
         placed = (self.body.vertices + np.asarray(beside)).astype(np.float32)
@@ -191,15 +193,24 @@ class _Run:
         self.views.append(Candidate(f"after {n} touches", self.answer.x, float(n), scene=scene))
         text = (
             f"After {n} touches, {len(self._felt)} contacts: surface off by {error.mean():.1f} mm, 95 % within "
-            f"{np.quantile(error, 0.95):.1f} mm; grasp believed {self.answer.mean:.3f}, true {true:.3f}."
+            f"{np.quantile(error, 0.95):.1f} mm; grasp believed {self.answer.mean:.3f}, true {self.true:.3f}."
         )
         self.notes.append(text)
         shown = (error.mean(), np.quantile(error, 0.95), 1e3 * deviation.mean())
-        worth = (self.answer.mean, true, tried)
+        worth = (self.answer.mean, self.true, tried)
         self.rows.append(
             (str(n), *(f"{v:.1f}" for v in shown), *("none yet" if np.isnan(v) else f"{v:.3f}" for v in worth))
         )
         return text
+
+    def answered(self) -> str:
+        """Return the grasp that the exploration ends with, in words."""
+        from surehold.cli.grasp import pose_text
+
+        return (
+            f"The grasp it ends with: {pose_text(self.real.grasp(self.answer.x))}; mean quality under the hand's noise "
+            f"believed {self.answer.mean:.3f}, on the true shape {self.true:.3f}."
+        )
 
     def write(self, folder: Path) -> Path:
         """Write page, numbers and picture, and return the page's path."""
@@ -215,9 +226,14 @@ class _Run:
         last = Candidate("the grasp, on the true shape", self.answer.x, -1.0, scene=drawn(self.real, grasp))
         note = f"{grasp.status}, quality {grasp.quality:.3f} with {len(grasp.contacts)} contacts."
         goal = "to find a safe grasp" if self.goal == "grasp" else "to know the shape"
-        text = f"Touched {goal}. Left what is believed, right the true shape: {LEGEND} The dots are contacts."
+        text = (
+            f"Touched {goal}. Left what is believed, right the true shape: {LEGEND} The dots are contacts. "
+            f"{self.answered()} Below, errors are distances of the true surface to the one believed, the deviation is "
+            "what the model says of them, and believed and true are those of the grasp that was best by then."
+        )
         views = [*self.views, last]
-        page = render_scenes(f"Exploring the {self.body.name}", text, views, [*self.notes, note], _COLUMNS, self.rows)
+        title, below = f"Exploring the {self.body.name}", "What the touches taught"
+        page = render_scenes(title, text, views, [*self.notes, note], _COLUMNS, self.rows, below)
         write_file(folder / "explore.html", page)
         if self.views[-1].scene is not None:
             write_file(folder / "shape.png", still_picture(replace(self.views[-1].scene, contacts=None))[0])

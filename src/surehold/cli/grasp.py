@@ -142,13 +142,11 @@ def grasp(
 
     def describe(candidate: Candidate) -> Candidate:
         found = outcomes.grasp(candidate.x)
-        position = ", ".join(f"{1000 * p:.1f}" for p in found.pose.position)
-        turn = ", ".join(f"{q:.3f}" for q in found.pose.quaternion)
         physics = {} if check is None else checked(checker, outcomes, candidate, check, console)
         return replace(
             candidate,
             status=found.status,
-            pose=f"palm at ({position}) mm, quaternion ({turn}), {posture_text(found.s1)}",
+            pose=pose_text(found),
             details=dict(candidate.details)
             | {
                 "contacts": str(len(found.contacts)),
@@ -235,10 +233,13 @@ def drawn(problem: Any, outcome: Any) -> Any:
     return replace(scene, meshes=(*meshes, *scene.meshes[1:]), legend=LEGEND)
 
 
-def posture_text(s1: float | tuple[float, ...]) -> str:
-    """Return the posture of a grasp in words."""
-    amplitudes = s1 if isinstance(s1, tuple) else (s1,)
-    return ", ".join(f"s{i + 1} = {s:.2f} rad" for i, s in enumerate(amplitudes))
+def pose_text(outcome: Any) -> str:
+    """Return where the palm of a grasp is and its posture in words."""
+    position = ", ".join(f"{1000 * p:.1f}" for p in outcome.pose.position)
+    turn = ", ".join(f"{q:.3f}" for q in outcome.pose.quaternion)
+    amplitudes = outcome.s1 if isinstance(outcome.s1, tuple) else (outcome.s1,)
+    posture = ", ".join(f"s{i + 1} = {s:.2f} rad" for i, s in enumerate(amplitudes))
+    return f"palm at ({position}) mm, quaternion ({turn}), {posture}"
 
 
 def losses(problem: Any, x: Any, noise: Any, seed: int) -> dict[str, str]:

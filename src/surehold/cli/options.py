@@ -190,8 +190,8 @@ def _point(text: str) -> dict[str, float | str]:
     return found
 
 
-def numbers_given(text: str) -> dict[str, float] | None:
-    """Return {name: value} of --constraints NAME=VALUE,...; None where there is none.
+def numbers_given(text: str) -> dict[str, float | None] | None:
+    """Return {name: value} of --constraints NAME=VALUE,...; None where there is none, None as the value of "none".
 
     Raises InputError for values that are no numbers.
     """
@@ -200,8 +200,9 @@ def numbers_given(text: str) -> dict[str, float] | None:
     if not text:
         return None
     try:
-        return {name: float(value) for name, value in parse_assignments(text, "--constraints").items()}
+        given = parse_assignments(text, "--constraints")
+        return {name: None if value.lower() == "none" else float(value) for name, value in given.items()}
     except InputError:
         raise
     except ValueError:
-        raise InputError(f"--constraints {text!r} holds what is no number; write torque=3.1,force=2.") from None
+        raise InputError(f"--constraints {text!r} holds what is no number; write torque=3.1,force=none.") from None

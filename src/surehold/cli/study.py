@@ -187,7 +187,7 @@ def recommend(name: Name, storage: Storage = "", as_json: Json = False) -> None:
 
     study = opened(name, storage)
     best = study.recommend()
-    lines = [f"trial {best.trial}: expect {best.mean:.4g} ± {best.std:.2g}, 95 % better than {best.quantile:.4g}"]
+    lines = [f"trial {best.trial}: expect {best.expected}"]
     units = study.settings.units
     lines += [f"  {key} = {value} {units.get(key, '')}".rstrip() for key, value in best.parameters.items()]
     lines += [f"  expected {key} {value:.4g}" for key, value in best.outputs.items()]

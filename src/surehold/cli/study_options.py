@@ -22,7 +22,12 @@ Storage = Annotated[
         show_default=False,
     ),
 ]
-Outputs = Annotated[str, typer.Option(help="Further outputs, such as torque=3.1: NAME=VALUE,...", show_default=False)]
+Outputs = Annotated[
+    str,
+    typer.Option(
+        help="Further outputs, NAME=VALUE,...; none as the value of one that could not be measured.", show_default=False
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Answer in JSON, one object.")]
 
 

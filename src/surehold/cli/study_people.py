@@ -131,10 +131,12 @@ def import_trials(
         if parameter not in names:
             raise unknown_name("parameter", parameter, names)
         names[parameter] = column
+    outputs = [limit.name for limit in target.limits]
     if file:
-        found = warm_start.trials_of_csv(file, names, value)
+        found = warm_start.trials_of_csv(file, names, value, outputs)
     else:
-        found = warm_start.trials_of_study(warm_start.former_study(study, source), names, target.settings.direction)
+        former = warm_start.former_study(study, source)
+        found = warm_start.trials_of_study(former, names, target.settings.direction, outputs)
     left_out = warm_start.import_trials(target, found, skip_bad=skip_bad)
     count = len(found) - len(left_out)
     lines = [f"{count} trial{'s' * (count != 1)} imported into {name}", *(f"left out: {why}" for why in left_out)]

@@ -110,8 +110,8 @@ def checked_outputs(
     for limit in limits:
         if limit.name not in given and not failed and not limit.watched:
             raise InputError(
-                f"the trial says nothing about '{limit.name}'; tell constraints={{{limit.name!r}: value}}, or None "
-                "where it could not be measured."
+                f"the trial says nothing about '{limit.name}'; tell constraints={{{limit.name!r}: value}} "
+                f"(--constraints {limit.name}=VALUE), or None where it could not be measured."
             )
         value = given.get(limit.name)
         try:

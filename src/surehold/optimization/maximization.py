@@ -308,7 +308,7 @@ def _told(optimizer: Optimizer, evaluation: Evaluation, index: int) -> Trial:
         if optimizer.outcome == "success" and not failure:
             if y not in (0.0, 1.0):
                 raise InputError(f"the function returned {y:g}, but outcome='success' needs True or False (or 1 or 0).")
-            optimizer.tell(asked, success=bool(y))
+            optimizer.tell(asked, success=bool(y), constraints=told or None)
         else:
             optimizer.tell(asked, None if failure else y, failed=bool(failure), constraints=told or None)
     except InputError as error:  # of what the function returned; the run is not lost for it

@@ -132,6 +132,8 @@ class Record(ABC):
             `AskedTrial` has been told before; if y is missing, not finite or not a number; if a failed trial comes with
             a value; if an output is missing, unknown or not finite. Nothing told before is lost.
         """
+        if failed and self.outcome == "success":  # what a failed trial does not say was not measured
+            constraints = {limit.name: None for limit in self.limits} | dict(constraints or {})
         y, executions, failed = counted(self.outcome, y, success, successes, of, failed)
         y = None if y is None else self._sign * number_of(y)
         if self._conditions_measured:

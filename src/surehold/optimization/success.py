@@ -51,14 +51,14 @@ def check_combination(settings: Mapping[str, Any]) -> None:
     preference = settings["outcome"] == "preference"
     defaults = {
         "direction": "maximize",
-        **({"surrogate": None, "failures": None, "conditions": "commanded"} if preference else {"criterion": None}),
+        "failures": None,
+        **({"surrogate": None, "conditions": "commanded", "constraints": None} if preference else {"criterion": None}),
         "noise": None,
         "output_range": None,
         "risk": "mean",
         "noise_while_exploring": False,
         "trust_region": False,
         "preset": None,
-        "constraints": None,
     }
     for name, value in defaults.items():
         given = settings.get(name, value)
@@ -102,6 +102,8 @@ def counted(
         if not isinstance(success, (bool, np.bool_)):
             raise InputError(f"success is {success!r}; give True or False.")
         return float(success), 1, False
+    if told and (successes is None or of is None):
+        raise InputError(f"successes are {successes} of {of}; tell both, such as successes=7, of=10.")
     if successes is None or of is None:
         raise InputError("nothing was told; say tell(x, success=True), or tell(x, successes=7, of=10).")
     for name, value, least in (("of", of, 1), ("successes", successes, 0)):

@@ -66,8 +66,9 @@ def marked(report: RunReport, view: Surface | None = None) -> dict[str, np.ndarr
     if view is not None:
         for variable, axis in zip(view.variables, view.axes, strict=True):
             inside &= (report.X[:, variable] >= axis[0]) & (report.X[:, variable] <= axis[-1])
-    ok, failed = inside & ~report.failed, inside & report.failed
-    return {"trials-initial": ok & initial, "trials-later": ok & ~initial, "trials-failed": failed, "trials-told": ok}
+    ok, told = inside & ~report.lost, inside & ~report.failed
+    lost = inside & report.lost
+    return {"trials-initial": ok & initial, "trials-later": ok & ~initial, "trials-failed": lost, "trials-told": told}
 
 
 def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:

@@ -232,6 +232,11 @@ class RunReport:
         return ~np.isfinite(self.y)
 
     @property
+    def lost(self) -> NDArray[np.bool_]:
+        """Which trials gave no value, or of whose executions less than half succeeded, (n,)."""
+        return self.failed | (self.counted & (self.y < 0.5))
+
+    @property
     def observed(self) -> Candidate:
         """The best trial observed."""
         return self.candidates[0]

@@ -15,8 +15,9 @@ def render_scenes(
     notes: Sequence[str],
     columns: Sequence[str],
     rows: Sequence[Sequence[str]],
+    heading: str = "All of them",
 ) -> str:
-    """Return the page as HTML text: one view for each candidate, the one of highest quality first, and a table.
+    """Return the page as HTML text: a view for each candidate, the one of highest quality first, and a headed table.
 
     Raises
     ------
@@ -37,6 +38,7 @@ def render_scenes(
             css=Markup((TEMPLATES / "report.css").read_text(encoding="utf-8")),
             columns=columns,
             rows=rows,
+            heading=heading,
             **scene_context(candidates, notes, first=max(range(len(candidates)), key=lambda i: candidates[i].quality)),
         )
     )

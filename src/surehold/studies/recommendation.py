@@ -20,6 +20,7 @@ __all__ = ["RECOMMENDATION", "StudyRecommendation", "find_recommendation", "reco
 
 #: Study attribute that holds the recommendation last written.
 RECOMMENDATION: Final = "surehold:recommendation"
+_SHARES: Final = (0.9, 0.99)  # of executions that succeed, of which the model says how sure it is
 _END: Final = "*Written by surehold; notes of your own below this line are kept.*"
 
 
@@ -56,6 +57,18 @@ class StudyRecommendation:
     """why nothing feasible is known; empty where something is"""
     outputs: dict[str, float] = field(default_factory=dict)
     """what is expected of the further outputs, by name"""
+    sure: dict[str, float] = field(default_factory=dict)
+    """where trials succeed or fail: how sure the model is that at least this share of executions succeed, by share"""
+
+    @property
+    def expected(self) -> str:
+        """What is expected of executions, in words."""
+        if self.sure:
+            more = ", ".join(
+                f"{probability:.0%} sure of at least {float(s):.0%}" for s, probability in self.sure.items()
+            )
+            return f"{self.mean:.1%} of executions succeed; 95% sure of at least {self.quantile:.1%}, {more}"
+        return f"{self.mean:.4g} ± {self.std:.2g}, 95 % better than {self.quantile:.4g}"
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -104,7 +117,7 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     space = sampler.search_space(study)
     history = sampler.history(trials, space)
     with sampler.optimizing(space, history, direction) as optimizer:
-        best = optimizer.recommend()
+        best, success = optimizer.recommend(), optimizer.outcome == "success"
         told = np.flatnonzero(np.isfinite(history.y))
         distance = np.abs(optimizer.box.to_unit(history.reached[told]) - optimizer.box.to_unit(best.x)).max(axis=1)
         # what was reached outside of the ranges cannot be commanded: the nearest place that can is the answer
@@ -129,6 +142,7 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         best.feasible,
         best.infeasible,
         {name: outcome.mean for name, outcome in best.outputs.items()},
+        {f"{share:g}": best.probability_of_share(share) for share in _SHARES} if success else {},
     )
 
 
@@ -141,9 +155,8 @@ def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> 
         "| --- | --- |",
         *(f"| {key} | {_shown(value)} {units.get(key, '')} |" for key, value in found.parameters.items()),
         "",
-        f"Expect {found.mean:.4g} on average when the input is off, {found.mean:.4g} ± {found.std:.2g} of one "
-        f"execution; 95 % of executions are better than {found.quantile:.4g}. It gave {found.observed:.4g} when it was "
-        f"tried. {found.n} trials with a value.",
+        f"Expected when the input is off: {found.expected}. It gave {found.observed:.4g} when it was tried. {found.n} "
+        "trials with a value.",
     ]
     if found.outputs:
         expected = ", ".join(f"{name} {_shown(value)}" for name, value in found.outputs.items())

@@ -208,7 +208,7 @@ class Sampler(BaseSampler):
         """Return the size of the initial design in a search space."""
         given, first = self._settings.get("n_initial"), len(self._settings.get("initial_points") or ())
         if self._settings.get("safety") is not None:
-            return first
+            return max(first, 1)  # without any, the optimizer says that it needs them
         return max(Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given, first)
 
     @contextmanager

@@ -44,11 +44,16 @@ class SearchSpace:
     Raises
     ------
     InputError
-        If there is no parameter, or bounds are reversed or not finite.
+        If there is no parameter, bounds are reversed or not finite, or a variable of the box is uncontrolled.
     """
 
     def __init__(self, parameters: Box | Mapping[str, Any]):
         if isinstance(parameters, Box):
+            if parameters.uncontrolled is not None:
+                raise InputError(
+                    f"a study chooses all of its parameters, but of {parameters} some are not set by anybody; take a "
+                    "surehold.Optimizer, which averages over them."
+                )
             parameters = {variable.name: variable for variable in parameters.variables}
         if not isinstance(parameters, Mapping) or not parameters:
             raise InputError(f"search space is {parameters!r}; give a Box, or {{name: distribution}} of Optuna.")

@@ -30,7 +30,10 @@ def _whole(value: Any) -> Any:
 _Id = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=2**31 - 1, description="Of the trial, as ask gave it.")]
 _Text = Annotated[str, Field(max_length=500)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
-_Value = Annotated[_Finite | Literal["success", "failure"] | None, Field(description="Outcome; or success or failure.")]
+_Value = Annotated[
+    bool | _Finite | Literal["success", "failure"] | None,
+    Field(description="Outcome; of success: true or success, false or failure."),
+]
 _Count = Annotated[
     int | None, BeforeValidator(_whole), Field(description="In place of value: successes, of so many executions.")
 ]

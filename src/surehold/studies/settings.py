@@ -41,6 +41,8 @@ class StudySettings:
     def __post_init__(self) -> None:
         if self.direction not in ("maximize", "minimize"):
             raise unknown_name("direction", self.direction, ("maximize", "minimize"))
+        if self.direction == "minimize" and self.optimizer.get("outcome", "value") != "value":
+            raise InputError("direction='minimize' is of values; where trials succeed or fail, success is maximized.")
         _noise_to_json(self.input_noise, self.space)
         for name in self.units:
             if name not in self.space.distributions:

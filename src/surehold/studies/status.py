@@ -9,7 +9,7 @@ from typing import Any
 from optuna.trial import FrozenTrial, TrialState
 
 from surehold.studies.csv_cells import written_cell
-from surehold.studies.history import EXECUTIONS, REACHED, parameters_of
+from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
 from surehold.studies.ledger import NOTE, VETOED, holder_of
 from surehold.studies.robot import RobotStudy
 
@@ -50,7 +50,7 @@ def status(study: RobotStudy) -> dict[str, Any]:
 
 
 def rows(study: RobotStudy) -> list[dict[str, Any]]:
-    """Return one row a trial: id, state, value, parameters, what was reached, times, note.
+    """Return one row a trial: id, state, value, further outputs, parameters, what was reached, times, note.
 
     Of a study about success also "of": of how many executions the value is the share that succeeded.
     """
@@ -58,7 +58,7 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
     counted = study.settings.optimizer.get("outcome") == "success"
     for trial in study.trials():
         parameters, reached = parameters_of(trial), trial.user_attrs.get(REACHED, {})
-        names = study.settings.space.distributions
+        names, outputs = study.settings.space.distributions, trial.user_attrs.get(OUTPUTS, {})
         holder = holder_of(trial)
         found.append(
             {
@@ -66,6 +66,7 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
                 "state": _state(trial),
                 "value": trial.values[0] if trial.state == TrialState.COMPLETE and trial.values else None,
                 **({"of": trial.user_attrs.get(EXECUTIONS, 1)} if counted else {}),
+                **{f"output_{limit.name}": outputs.get(limit.name) for limit in study.limits},
                 **{name: parameters.get(name) for name in names},
                 **{f"reached_{name}": reached.get(name) for name in names},
                 "begun": trial.datetime_start.isoformat() if trial.datetime_start else None,
@@ -86,6 +87,7 @@ def to_csv(study: RobotStudy) -> str:
         "state",
         "value",
         *of,
+        *(f"output_{limit.name}" for limit in study.limits),
         *names,
         *(f"reached_{n}" for n in names),
         "begun",

@@ -25,8 +25,8 @@ def answer(
     if optimizer.get("outcome", "value") != "success":
         if successes is not None or of is not None:
             said = f"{successes} successes of {of} were"
-        elif isinstance(value, str) and (value in ("success", "failure") or "/" in value):
-            said = f"{value[:60]!r} was"
+        elif isinstance(value, bool) or (isinstance(value, str) and (value in ("success", "failure") or "/" in value)):
+            said = f"{str(value)[:60]!r} was"
         else:
             return value, 1
         raise InputError(f"{said} told, but this study is told values; create one with --outcome success.")

@@ -4,7 +4,7 @@ All rows are checked before the first is stored.
 """
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,10 +13,12 @@ from optuna.study import Study
 from optuna.trial import TrialState
 
 from surehold.errors import InputError
+from surehold.optimization.limits import checked_outputs
 from surehold.studies.csv_cells import cell_text
-from surehold.studies.history import EXECUTIONS, REACHED
+from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED
 from surehold.studies.ledger import checked_value
 from surehold.studies.robot import RobotStudy
+from surehold.studies.settings import SETTINGS
 from surehold.studies.storage import open_storage
 from surehold.studies.success import answer, count_told
 
@@ -38,9 +40,13 @@ class FormerTrial(NamedTuple):
     """the parameters that were truly reached, where they are known"""
     of: Any = None
     """executions of which the value is the share that succeeded, where that is known"""
+    outputs: Mapping[str, Any] | None = None
+    """further outputs; None for one that was not measured"""
 
 
-def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> list[FormerTrial]:
+def trials_of_csv(
+    path: str, names: Mapping[str, str], value: str = "value", outputs: Iterable[str] = ()
+) -> list[FormerTrial]:
     """Return the trials of a CSV file with a header.
 
     Parameters
@@ -51,6 +57,8 @@ def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> 
         Column of the value; where it is empty, or a column "state" says so, the trial failed. Rows whose state is
         running or waiting are left out. Columns reached_NAME hold what was truly reached; a column "of", into a study
         about success, of how many executions the value is the share that succeeded.
+    outputs
+        Names of further outputs, in the columns output_NAME or NAME; where they are empty, they were not measured.
 
     Raises
     ------
@@ -67,6 +75,7 @@ def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> 
         if column not in columns:
             raise InputError(f"file {path!r} has no column {column!r}; it has {', '.join(columns) or 'none'}.")
     found = []
+    measured = {name: column for name in outputs for column in (name, f"output_{name}") if column in columns}
     for row in reader:
         state = (row.get("state") or "").strip().lower()
         if state in _UNFINISHED:
@@ -81,11 +90,14 @@ def trials_of_csv(path: str, names: Mapping[str, str], value: str = "value") -> 
         failed = state in _FAILED or not told
         where = f"{Path(path).name}, line {reader.line_num}"
         of = None if failed else (row.get("of") or "").strip() or None
-        found.append(FormerTrial(where, parameters, None if failed else told, failed, reached, of))
+        told_outputs = {name: cell_text((row[column] or "").strip()) or None for name, column in measured.items()}
+        found.append(FormerTrial(where, parameters, None if failed else told, failed, reached, of, told_outputs))
     return found
 
 
-def trials_of_study(study: Study, names: Mapping[str, str], direction: str) -> list[FormerTrial]:
+def trials_of_study(
+    study: Study, names: Mapping[str, str], direction: str, outputs: Iterable[str] = ()
+) -> list[FormerTrial]:
     """Return the finished trials of a study of Optuna; `names` are {parameter: its name there}.
 
     Values of a study of the other direction change their sign. Trials that lack a parameter are refused by
@@ -94,6 +106,7 @@ def trials_of_study(study: Study, names: Mapping[str, str], direction: str) -> l
     if len(study.directions) != 1:
         raise InputError(f"study '{study.study_name}' has {len(study.directions)} objectives; one is needed.")
     sign = 1.0 if study.direction.name == direction.upper() else -1.0
+    watched = study.user_attrs.get(SETTINGS, {}).get("optimizer", {}).get("constraints") or {}
     found = []
     for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.FAIL)):
         failed = trial.state == TrialState.FAIL
@@ -103,7 +116,9 @@ def trials_of_study(study: Study, names: Mapping[str, str], direction: str) -> l
         value = None if failed or not trial.values else sign * trial.values[0]
         where = f"{study.study_name}, trial {trial.number}"
         of = None if failed else trial.user_attrs.get(EXECUTIONS)
-        found.append(FormerTrial(where, parameters, value, failed, reached, of))
+        told = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
+        kept = {name: told.get(name) for name in outputs if name in told or name in watched}
+        found.append(FormerTrial(where, parameters, value, failed, reached, of, kept))
     return found
 
 
@@ -127,6 +142,7 @@ def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: boo
             if trial.of is not None and settings.get("outcome") == "success":
                 trial = trial._replace(value=count_told(trial.value, trial.of))
             checked_value(answer(settings, trial.value)[0], trial.failed)
+            checked_outputs(study.limits, trial.outputs, trial.failed)
             commanded = study.settings.space.check(trial.parameters)
             study.settings.space.check_reached(commanded, trial.reached)
             good.append(trial)
@@ -140,6 +156,7 @@ def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: boo
             trial.value,
             failed=trial.failed,
             reached=trial.reached or None,
+            constraints=trial.outputs,
             note=f"from {trial.where}",
         )
     return left_out

@@ -13,6 +13,19 @@ def values_of(function):
     return function(GRID.nodes).reshape(GRID.shape)
 
 
+def test_a_grid_has_no_more_nodes_than_it_may():
+    half = np.array([0.09, 0.035, 0.08])
+    coarse = grid_around(-half, half, 0.001, 0.02, most=5000)
+    assert 4000 < np.prod(coarse.shape) <= 5000
+    assert np.all(coarse.nodes.max(axis=0) >= half + 0.02 - 1e-12)
+
+
+def test_gaps_to_a_grid():
+    last = GRID.nodes.max(axis=0)
+    points = np.array([[0.0, 0.0, 0.0], np.add(last, [0.0, 0.03, 0.04]), GRID.first - [0.01, 0.0, 0.0]])
+    assert GRID.gap(points) == pytest.approx([0.0, 0.05, 0.01])
+
+
 def test_distance_of_a_sphere_from_a_function_that_is_none():
     field = distances_of(values_of(lambda x: np.sum(x * x, axis=1) / 0.04 - 0.04), GRID)  # no distance, but its zeros
     x = np.random.default_rng(0).uniform(-0.055, 0.055, (4000, 3))

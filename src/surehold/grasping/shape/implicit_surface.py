@@ -127,18 +127,21 @@ def surface_of(
     SureholdError
         If the observations contradict each other so much that their covariance has no factor.
     """
-    surface = _conditioned(prior, replace(observations, free=_rows(4)), std, length)
+    from threadpoolctl import threadpool_limits
+
     free, floor = observations.free[:, :3], observations.free[:, 3]
-    for _ in range(_ROUNDS if len(free) else 0):
-        short = floor - surface.fast_value(free)
-        worst = np.argsort(-short, kind="stable")[: 20 * _MOST_ACTIVE]
-        worst = worst[short[worst] > 0.5 * _BOUND_NOISE]
-        if not len(worst):
-            break
-        chosen = spaced(free[worst], 0.15 * length)[:_MOST_ACTIVE]
-        active = worst[chosen]
-        added = Observations(free[active], floor[active], np.full(len(active), _BOUND_NOISE))
-        surface = _with_values(surface, added)
+    with threadpool_limits(1, "blas"):
+        surface = _conditioned(prior, replace(observations, free=_rows(4)), std, length)
+        for _ in range(_ROUNDS if len(free) else 0):
+            short = floor - surface.fast_value(free)
+            worst = np.argsort(-short, kind="stable")[: 20 * _MOST_ACTIVE]
+            worst = worst[short[worst] > 0.5 * _BOUND_NOISE]
+            if not len(worst):
+                break
+            chosen = spaced(free[worst], 0.15 * length)[:_MOST_ACTIVE]
+            active = worst[chosen]
+            added = Observations(free[active], floor[active], np.full(len(active), _BOUND_NOISE))
+            surface = _with_values(surface, added)
     return surface
 
 
@@ -196,7 +199,6 @@ def _conditioned(
 def _with_values(surface: ImplicitSurface, added: Observations) -> ImplicitSurface:
     """Return the surface after more values: their rows are appended to the factor, which costs a tenth of a new one."""
     from scipy.linalg import solve_triangular
-    from threadpoolctl import threadpool_limits
 
     known, std, length = surface.observations, surface.std, surface.length
     n, k, size = len(known.points), len(added.points), len(surface.factor)
@@ -204,21 +206,18 @@ def _with_values(surface: ImplicitSurface, added: Observations) -> ImplicitSurfa
     cross = cross_covariance(added.points, known.points, known.slope_points, std, length)
     factor = np.zeros((size + k, size + k))
     factor[:size, :size] = surface.factor
-    with threadpool_limits(1, "blas"):
-        below = solve_triangular(surface.factor, cross.T[surface.order], lower=True, check_finite=False).T
-        own = covariance(added.points, _rows(), std, length) - below @ below.T
+    below = solve_triangular(surface.factor, cross.T[surface.order], lower=True, check_finite=False).T
+    own = covariance(added.points, _rows(), std, length) - below @ below.T
     factor[size:, :size], factor[size:, size:] = below, _factor(own, added.noise, std, known + added)
     return _weighted(surface.prior, known + added, std, length, order, factor)
 
 
 def _factor(gram: Array, noise: Array, std: float, observations: Observations) -> Array:
     from scipy.linalg import cholesky
-    from threadpoolctl import threadpool_limits
 
     gram[np.diag_indices_from(gram)] += np.square(noise) + (1e-6 * std) ** 2
     try:
-        with threadpool_limits(1, "blas"):
-            return cholesky(gram, lower=True, overwrite_a=True, check_finite=False)
+        return cholesky(gram, lower=True, overwrite_a=True, check_finite=False)
     except np.linalg.LinAlgError:
         raise SureholdError(
             f"the covariance of {len(observations.points)} points and {len(observations.slopes)} normals has no "

@@ -41,6 +41,11 @@ class Grid:
         """Return the numbers (n, 3) of the nodes nearest to points (n, 3)."""
         return np.clip(np.rint((points - self.first) / self.cell), 0, np.array(self.shape) - 1).astype(np.intp)
 
+    def gap(self, points: Array) -> Array:
+        """Return how far points (n, 3) are from the grid's box [m], 0 inside."""
+        last = self.first + self.cell * (np.array(self.shape) - 1)
+        return np.linalg.norm(np.maximum(np.maximum(self.first - points, points - last), 0.0), axis=1)
+
     @property
     def nodes(self) -> Array:
         """All nodes (nx ny nz, 3) [m], the last coordinate fastest."""
@@ -55,7 +60,8 @@ def grid_around(lower: Array, upper: Array, cell: float, margin: float, most: in
     """
     size = upper - lower + 2.0 * margin
     cell = max(cell, float(np.cbrt(np.prod(size) / most)))
-    shape = 2 * np.ceil(0.5 * size / cell).astype(int) + 1
+    while np.prod(shape := 2 * np.ceil(0.5 * size / cell).astype(int) + 1) > most:
+        cell *= 1.01
     return Grid(lower - margin, cell, (int(shape[0]), int(shape[1]), int(shape[2])))
 
 

@@ -140,10 +140,9 @@ def _enough(points: Array, kind: str) -> None:
 def _check_unit(points: Array) -> None:
     low, high = np.quantile(points, [0.02, 0.98], axis=0)
     size = float((high - low).max())
-    if size > 4.0:
-        raise InputError(f"the cloud spans {size:.3g} m; if it is in millimeters, give --unit mm.")
-    if size < _SMALLEST:
-        raise InputError(f"the cloud spans {1e3 * size:.3g} mm; give its --unit: mm, cm, m or in.")
+    if not _SMALLEST <= size <= 4.0:
+        spans = f"{size:.3g} m" if size > 4.0 else f"{1e3 * size:.3g} mm"
+        raise InputError(f"the cloud spans {spans}; give the unit of its numbers: --unit mm, cm, m or in.")
 
 
 def _even_part(points: Array) -> Array:

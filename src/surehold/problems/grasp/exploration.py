@@ -148,7 +148,8 @@ class Exploration:
         self.X, self.y = np.vstack([self.X, X]), np.append(self.y, y)
         for each in felt:
             self._felt = self._felt + replace(each, free=np.empty((0, 4)))
-            self._free = np.vstack([self._free, each.free])  # bounds become active anew: what is learnt may free them
+            near = self.belief.grid.gap(each.free[:, :3]) < each.free[:, 3].max(initial=0.0)  # others lift no node
+            self._free = np.vstack([self._free, each.free[near]])  # active anew: what is learnt may free them
         self._free = self._free[spaced(self._free[:, :3], _FREE_SPACING)]
         if felt:
             surface = self.belief.surface
