@@ -112,6 +112,7 @@ def run(name, method, seed):
 def main():
     parser = argparse.ArgumentParser(description="Plain runs on smooth functions, where precision counts.")
     parser.add_argument("--seeds", type=int, default=20, help="number of seeds, 2 or more")
+    parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument(
         "--functions", nargs="+", default=[name for name in FUNCTIONS if "wide" not in name], choices=list(FUNCTIONS)
     )
@@ -124,7 +125,10 @@ def main():
     for name in arguments.functions:
         reference = None
         for method in arguments.methods:
-            jobs = (delayed(run)(name, method, seed) for seed in range(arguments.seeds))
+            jobs = (
+                delayed(run)(name, method, seed)
+                for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+            )
             half, full, seconds = np.array(Parallel(n_jobs=arguments.processes)(jobs)).T
             reference = full if reference is None else reference
             parts = [

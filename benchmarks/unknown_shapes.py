@@ -259,7 +259,9 @@ def main():
     parser.add_argument("--spread", type=float, default=SPREAD[0])
     parser.add_argument("--length", type=float, default=SPREAD[1])
     args = parser.parse_args()
-    objects = training_objects() if args.training else {n: shipped_object(n) for n in args.objects.split(",")}
+    objects = own = training_objects()
+    if not args.training:
+        objects = {name: own[name] if name in own else shipped_object(name) for name in args.objects.split(",")}
     with threadpool_limits(1):
         {"shape": shape, "grasp": grasp, "explore": explore, "search": search, "time": timed}[args.what](objects, args)
 

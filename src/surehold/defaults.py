@@ -267,6 +267,10 @@ ROUNDED: Final = 0.01
 #: spoil no run of 20 with it; a smaller one would take true low values for outliers. Never measured otherwise.
 OUTLIER_DISTANCE: Final = 5.0
 
+#: Trials of which it is judged whether deep values are compressed in the search; of fewer the median says little. Never
+#: measured on its own; the whole: python -m benchmarks.smooth_regret.
+LOW_TAIL_FROM: Final = 7
+
 # --- constraints ------------------------------------------------------------------------------------------------------
 
 #: Points of a Sobol sequence tested for the first allowed inputs: at most so many where all constraints are linear, and

@@ -7,6 +7,7 @@ import pytest
 
 from surehold.cli import run
 from surehold.errors import InputError
+from surehold.grasping.object.distance_field import distance_field_of
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.shape.views import camera_towards, half_view
 
@@ -163,6 +164,13 @@ def test_contacts_that_contradict_a_cloud_or_themselves_are_refused(here, capsys
         place = file["points"][0].tolist()
     assert "normals 180 degrees" in told([{"point": place, "normal": [v, 0, 0]} for v in (1, -1)])
     assert "mm off the surface" in told([{"point": [0.0, 0.0, 0.6], "normal": [0, 0, 1]}])
+    bottle = shipped_object("bottle")
+    seen = camera_towards(bottle, 0.5, 0.3, 0.02)  # beside its axis, on the camera's side
+    field = distance_field_of(bottle)
+    outward = field.gradient(seen[None])[0]
+    seen = seen - field.distance(seen[None])[0] * outward
+    contact = {"point": seen.tolist(), "normal": (-outward).tolist()}
+    assert "its normal points into the object" in told([contact])
 
 
 def test_a_robot_tells_contacts_and_the_next_trial_follows_from_them(here, capsys):

@@ -17,14 +17,14 @@ from surehold.optimization.trials import Trials, same
 __all__ = ["Asking", "history_of"]
 
 
-def history_of(trials: Trials, requirements: Requirements | None) -> History:
-    """Return what a strategy knows of the trials."""
+def history_of(trials: Trials, requirements: Requirements | None, values: NDArray[np.float64]) -> History:
+    """Return what a strategy knows of the trials, whose values (t,) count as given."""
     told = trials.eligible  # those that reached a place outside of the box are no answer, as failed ones
     admission = None
     if requirements is not None:
         told = requirements.feasible(trials)
         admission = requirements.admission(trials)
-    return History(trials.places[told], trials.modelled[told], trials.reached[~told], trials.pending, admission)
+    return History(trials.places[told], values[told], trials.reached[~told], trials.pending, admission)
 
 
 class Asking:
@@ -72,7 +72,7 @@ class Asking:
         self, trials: Trials, posterior: Callable[[], Posterior], rng: np.random.Generator
     ) -> NDArray[np.float64]:
         strategy, requirements = self._parts.strategy, self._parts.requirements
-        history = history_of(trials, requirements)
+        history = history_of(trials, requirements, self._parts.search.values(trials))
         if len(history.tried):
             candidates = strategy.candidates(posterior(), history, rng)
         elif requirements is not None:

@@ -31,6 +31,7 @@ from surehold.optimization.strategy.protocol import Strategy
 from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.strategy.trust_region import TrustRegion
 from surehold.optimization.success import SUCCESS_SURROGATES, check_combination, success_surrogate
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.named import TELLABLE
 from surehold.optimization.surrogates.protocol import NoisySurrogate
 from surehold.optimization.surrogates.success.beta_process import BetaProcess
@@ -53,6 +54,8 @@ class Parts:
     lattice: Lattice | None
     limits: tuple[Limit, ...]
     model: ResponseModel
+    search: ResponseModel
+    """that by which trials are chosen: the same, but where deep values may be compressed"""
     strategy: Strategy
     requirements: Requirements | None
     design: NDArray[np.float64]
@@ -137,16 +140,18 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
             "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials "
             "('two_scales', 'gp', 'tgp', or an object with known_noise), without a thesis preset."
         )
-    model = ResponseModel(
-        surrogate,
-        box,
-        straying=straying,
-        lattice=lattice,
-        continues_chains=strategy.continues_chains,
-        seed=seed,
-        told=told,
-    )
+    learning: dict[str, Any] = {
+        "straying": straying,
+        "lattice": lattice,
+        "continues_chains": strategy.continues_chains,
+        "seed": seed,
+        "told": told,
+    }
+    model = search = ResponseModel(surrogate, box, **learning)
     limits = limits_of(s.constraints)
+    exact = strategy.ranking.exact_inputs and not strategy.ranking.noisy
+    if exact and thesis is None and isinstance(surrogate, GaussianProcess) and all(limit.watched for limit in limits):
+        search = ResponseModel(surrogate, box, **learning, compressed=True)
     for limit in limits:
         if limit.name in box.names:
             raise InputError(
@@ -181,6 +186,7 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
         lattice=lattice,
         limits=limits,
         model=model,
+        search=search,
         strategy=strategy,
         requirements=requirements,
         design=np.concatenate([first, rest]),

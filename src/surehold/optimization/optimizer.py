@@ -201,6 +201,7 @@ class Optimizer(Record):
         self._lattice: Final = parts.lattice
         self._strategy: Final = parts.strategy
         self._model: Final = parts.model
+        self._search: Final = parts.search
         self._requirements: Final = parts.requirements
         self._asking: Final = Asking(box, parts, self._conditions_measured)
         compile_ahead(given)
@@ -222,6 +223,7 @@ class Optimizer(Record):
 
     def _replaced(self) -> None:
         self._model.forget()
+        self._search.forget()
         if self._requirements is not None:
             self._requirements.forget()
 
@@ -281,7 +283,8 @@ class Optimizer(Record):
 
     def _ask_one(self, number: int | None) -> AskedTrial:
         position = self._trials.next_number if number is None else whole_number("number", number, 0)
-        u = self._asking.place(self._trials, position, number is not None, lambda: self.posterior)
+        modelled = self._modelled
+        u = self._asking.place(self._trials, position, number is not None, lambda: self._search.posterior(modelled))
         x = self.box.from_unit(u)
         return AskedTrial(self._trials.ask(position, u), x, self.box.as_dict(x))
 
@@ -413,7 +416,7 @@ class Optimizer(Record):
 
     @property
     def _history(self) -> History:
-        return history_of(self._trials, self._requirements)
+        return history_of(self._trials, self._requirements, self._trials.modelled)
 
     def _snapped(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         return U if self._lattice is None else self._lattice.snap(U)

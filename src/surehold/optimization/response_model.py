@@ -3,15 +3,17 @@
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.diagnosis import Diagnosis, diagnosis
 from surehold.optimization.lattice import Lattice, LatticePosterior
+from surehold.optimization.low_tail import LowTail, low_tail_of
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.strategy.thesis import ThesisConstants
-from surehold.optimization.surrogates.gaussian_process.model import NoiseName
+from surehold.optimization.surrogates.gaussian_process.model import NoiseName, learnt_from
 from surehold.optimization.surrogates.named import DEFAULT_SURROGATE, refuse_settings, surrogate_named
 from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate
@@ -70,6 +72,8 @@ class ResponseModel:
         Whether each trial tells the standard deviation of its observation noise.
     screened
         Whether failed trials and outliers count as the lowest other value; else all must have given a value.
+    compressed
+        Whether deep values are compressed where the trials speak for it; see `low_tail`.
     """
 
     def __init__(
@@ -83,6 +87,7 @@ class ResponseModel:
         seed: int,
         told: bool = False,
         screened: bool = True,
+        compressed: bool = False,
     ):
         self._surrogate: Final = surrogate
         self._box: Final = box
@@ -92,11 +97,26 @@ class ResponseModel:
         self._seed: Final = seed
         self._told: Final = told
         self._screened: Final = screened
+        self._compressed: Final = compressed
+        self._low_tail: tuple[int, LowTail] | None = None
         self._cache: tuple[int, Posterior] | None = None
 
     def forget(self) -> None:
         """Drop the posterior: the trials are others from now on."""
-        self._cache = None
+        self._cache = self._low_tail = None
+
+    def values(self, trials: Trials) -> NDArray[np.float64]:
+        """Return what is learnt from each trial, (t,); NaN if every trial failed."""
+        if not self._screened:
+            return trials.values
+        values, told = trials.modelled, trials.successful
+        if not self._compressed or not told.any():
+            return values
+        k = learnt_from(int(told.sum()))
+        if self._low_tail is None or self._low_tail[0] != k:
+            with single_threaded():
+                self._low_tail = k, low_tail_of(trials.reached[told], values[told])
+        return self._low_tail[1].apply(values)
 
     def posterior(self, trials: Trials) -> Posterior:
         """Return the surrogate conditioned on the trials told so far; inputs in the unit cube.
@@ -123,7 +143,7 @@ class ResponseModel:
             return model.condition(trials.reached, trials.values, rng, trials=trials.executions.astype(np.float64))
         if isinstance(model, PreferenceProcess):
             return model.condition(trials.reached, trials.pairs, np.random.default_rng([self._seed, 1, 0]))
-        values = trials.modelled if self._screened else trials.values
+        values = self.values(trials)
         if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self._straying.unit_roots(self._box, trials.commanded).copy()
             roots[trials.reported] = 0.0

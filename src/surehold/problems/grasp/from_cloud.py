@@ -65,6 +65,7 @@ def belief_of_file(words: Mapping[str, Any]) -> tuple[ShapeBelief, str]:
         raise InputError(f"cloud-noise is {noise!r} m; give a standard deviation above 0 and up to 0.02 m.")
     if words["mass"] is not None and not 0.0 < words["mass"] <= 100.0:
         raise InputError(f"mass is {words['mass']!r}; give kilograms above 0 and up to 100.")
+    touched = contacts_of_file(words["contacts"]) if words["contacts"] else None
     raw = read_cloud(words["cloud"])
     if words["normals"] and raw.normals is None:
         raise InputError(f"{words['cloud']!r} holds no normals; leave --normals out, they are estimated then.")
@@ -80,8 +81,7 @@ def belief_of_file(words: Mapping[str, Any]) -> tuple[ShapeBelief, str]:
     file = Path(words["cloud"])
     belief = belief_of_cloud(cloud, prior, name=file.stem, mass=words["mass"])
     notes = list(cloud.notes)
-    if words["contacts"]:
-        touched = contacts_of_file(words["contacts"])
+    if touched is not None:
         checked_against(belief.surface, touched, f"{words['contacts']!r}")
         known = belief.surface
         learnt = surface_of(known.prior, known.observations + touched, known.std, known.length)

@@ -27,6 +27,7 @@ _SAME_PLACE: Final = 0.001  # nearer contacts are of one spot of the surface [m]
 _LARGEST: Final = 2.0  # a coordinate [m]; what is larger was not told in meters
 _IMPOSSIBLE: Final = 6.0  # standard deviations that a contact may lie off what is known
 _CLOSE: Final = 0.008  # a contact nearer to the surface is never impossible [m]
+_CERTAIN: Final = 0.0015  # where the surface is known so well and is so near, normals are known: walls are thicker [m]
 _FORM: Final = '{"contacts": [{"point": [x, y, z], "normal": [x, y, z]}]} in meters'
 
 
@@ -125,12 +126,20 @@ def checked_against(surface: ImplicitSurface, told: Observations, what: str = "c
     Raises
     ------
     InputError
-        If a contact lies farther off the surface than is possible, or where the shape is known to be otherwise.
+        If a contact lies farther off the surface than is possible, or on it with a normal into the object.
     """
     if not len(told.points):
         return
     off = np.abs(surface.value(told.points))
     known = np.hypot(surface.deviation(told.points), told.noise)
+    outward = surface.gradient(told.points)
+    along = np.sum(outward * told.slopes, axis=1) / np.maximum(np.linalg.norm(outward, axis=1), 1e-9)
+    inward = np.flatnonzero((np.maximum(off, known) < _CERTAIN) & (along < -0.8))
+    if len(inward):
+        raise InputError(
+            f"contact {inward[0]} of {what} lies on the known surface, but its normal points into the object; "
+            "turn the normals: they point out of it."
+        )
     wrong = np.flatnonzero((off > _CLOSE) & (off > _IMPOSSIBLE * known))
     if len(wrong):
         k = int(wrong[np.argmax(off[wrong] / known[wrong])])
