@@ -132,3 +132,5 @@ def test_samples_outside_of_the_bounds():
         Box({"x": (0.0, 1.0), "w": (0.0, 2.0)}, uncontrolled={"w": [1.0, 3.0]})
     with pytest.raises(InputError, match="a criterion of it is"):
         Optimizer(BRANIN, criterion="log_ei")
+    with pytest.raises(InputError, match="fixed names 'b', which is uncontrolled"):
+        Optimizer(BRANIN, fixed={"b": 3.0})

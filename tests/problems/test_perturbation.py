@@ -94,3 +94,18 @@ def test_what_is_no_input_noise_names_the_right_call(noise, words):
     for score in (robust_score, lambda p, x, noise: p.expectation(x, noise)):
         with pytest.raises(InputError, match=words):
             score(p, [0.5], noise)
+
+
+def test_what_nobody_sets_is_drawn():
+    loads = np.array([0.2, 0.3, 0.3, 0.8])
+    box = Box({"grip": (0.0, 1.0)}, uncontrolled={"load": loads})
+    points = perturbed_points([0.4, 0.5], box, None, n=4000)
+    assert np.all(points[:, 0] == 0.4)
+    shares = [np.mean(points[:, 1] == load) for load in (0.2, 0.3, 0.8)]
+    assert shares == pytest.approx([0.25, 0.5, 0.25], abs=0.03)
+    strayed = perturbed_points([0.4, 0.5], box, InputNoise({"grip": 0.05, "load": 0.0}), n=4000)
+    assert strayed[:, 0].std() == pytest.approx(0.05, rel=0.05)
+    assert set(strayed[:, 1]) == {0.2, 0.3, 0.8}
+    score = robust_score(Function(lambda x: -((x[0] - x[1]) ** 2), box), [0.4, 0.8], None, n=20_000)
+    error = score.std / np.sqrt(20_000)
+    assert score.mean == pytest.approx(-np.mean((0.4 - loads) ** 2), abs=4 * error)

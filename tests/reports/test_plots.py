@@ -8,6 +8,7 @@ import pytest
 import surehold as sh
 from surehold.errors import InputError
 from surehold.reports.plots import result_report
+from surehold.reports.verdict import verdict
 
 BOX = sh.Box({"force": (0.1, 10.0, "log"), "grip": ["pinch", "power"]})
 
@@ -79,3 +80,19 @@ def test_boxes_of_many_kinds_are_drawn(tmp_path):
     assert force.get_xlim() == pytest.approx((0.1, 10.0))
     assert [text.get_text() for text in grip.get_xticklabels()] == ["pinch", "power"]
     assert "force [log]" in mixed.report(tmp_path / "mixed").read_text(encoding="utf-8")
+
+
+def test_a_trial_that_met_a_good_condition_is_refused():
+    def grip(x):
+        return float(x[1] - 3.0 * (x[0] - x[1]) ** 2)
+
+    box = sh.Box({"grip": (0.0, 1.0)}, uncontrolled={"load": [0.2, 0.3, 0.8]})
+    report = result_report(sh.maximize(grip, box, 15, seed=0), grip)
+    assert report.observed.quality > report.recommended.quality, "it was lucky"
+    assert report.observed.mean < report.recommended.mean
+    assert set(np.round(report.recommended.values, 6)) == {
+        round(grip((report.recommended.x[0], load)), 6) for load in (0.2, 0.3, 0.8)
+    }
+    told = verdict(report)
+    assert "when conditions differ" in told.headline + told.text
+    assert report.robust_trace is not None

@@ -46,6 +46,8 @@ def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | No
     for name in fixed:
         if name not in names:
             raise unknown_name("fixed variable", name, names)
+        if box.uncontrolled is not None and box.uncontrolled.held[box.columns(name)].any():
+            raise InputError(f"fixed names '{name}', which is uncontrolled: nobody sets it; leave it out.")
     x = box.points({**box.as_dict(box.from_unit(np.full(box.dimension, 0.5))), **fixed})
     if not box.contains(x):
         raise InputError(f"fixed is {dict(fixed)!r}, which is not inside {box}.")

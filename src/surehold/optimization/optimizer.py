@@ -133,8 +133,8 @@ class Optimizer(Record):
         executions) and what the models do not know.
     safety
         Probability with which every trial after the `initial_points`, which must be given and are trusted, has to keep
-        all limits. By default None: trials may break them. What that guarantees, and what not, is said in
-        `requirements.Requirements.admission`.
+        all limits. By default None: trials may break them. It holds as far as the models do, without a proof, and what
+        cannot be reached through safe inputs is never found (after Sui et al. 2015).
     failures
         What a failed trial teaches. "modelled": the response is learnt from the others alone, and a model of where
         trials succeed multiplies the criterion by that probability. "lowest": it counts as the lowest value told. By

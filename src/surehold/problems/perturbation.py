@@ -43,15 +43,16 @@ class RobustScore:
 def perturbed_points(
     x: ArrayLike,
     box: Box,
-    noise: InputNoise,
+    noise: InputNoise | None,
     n: int = 100,
     seed: int | np.random.Generator = 0,
     border: Literal["keep", "extend"] = "keep",
 ) -> NDArray[np.float64]:
     """Draw n inputs x + noise around x (d,) -> (n, d), in the units of the box.
 
-    A coordinate that would leave the box keeps its noise-free value (the thesis' rule), or with "extend" leaves it.
-    The draw depends on (noise, n, seed) only, so two inputs that are compared are shaken in the same way.
+    A coordinate that would leave the box keeps its noise-free value (the thesis' rule), or with "extend" leaves it. An
+    uncontrolled variable of the box is what it happens to be, drawn from its distribution, whatever x says of it; the
+    noise may then be None. The draw depends on (box, noise, n, seed) only: two inputs that are compared shake alike.
 
     Raises
     ------
@@ -66,16 +67,22 @@ def perturbed_points(
     if not box.contains(center[0]):
         raise InputError(f"x = {center[0].tolist()} lies outside {box!r}; score a point of the box.")
     rng = np.random.default_rng(seed)
-    unit = box.to_unit(center[0])
-    reached = unit + needed_input_noise(noise, box.names).draws(box, unit, int(n), rng)
+    unit, nobody = box.to_unit(center[0]), box.uncontrolled
+    reached = np.tile(unit, (int(n), 1))
+    if noise is not None or nobody is None:
+        reached = reached + needed_input_noise(noise, box.names).draws(box, unit, int(n), rng)
     if border == "extend":
-        return box.lower + reached * box.widths
-    outside = (reached < 0.0) | (reached > 1.0)
-    return np.where(outside, center[0], box.from_unit(np.clip(reached, 0.0, 1.0)))
+        points = box.lower + reached * box.widths
+    else:
+        outside = (reached < 0.0) | (reached > 1.0)
+        points = np.where(outside, center[0], box.from_unit(np.clip(reached, 0.0, 1.0)))
+    if nobody is not None:
+        points[:, nobody.held] = nobody.values[rng.integers(len(nobody.values), size=int(n))]
+    return points
 
 
 def robust_score(
-    problem: Problem, x: ArrayLike, noise: InputNoise, n: int = 100, seed: int | np.random.Generator = 0
+    problem: Problem, x: ArrayLike, noise: InputNoise | None, n: int = 100, seed: int | np.random.Generator = 0
 ) -> RobustScore:
     """Query `problem` at n perturbations of x (d,) and return mean, standard deviation and worst outcome.
 

@@ -155,8 +155,9 @@ def report_of(
     )
     y, minimized, counted = result.y, optimizer.direction == "minimize", optimizer.outcome == "success"
     robust = np.full(y.size, np.nan)
+    averaged = optimizer.input_noise is not None or box.uncontrolled is not None
     for trial in result.trials:
-        if trial.recommendation is not None and trial.index < y.size and optimizer.input_noise is not None:
+        if trial.recommendation is not None and trial.index < y.size and averaged:
             robust[trial.index] = trial.recommendation.mean
     return RunReport(
         title=title,

@@ -53,14 +53,15 @@ def result_report(result: Result, function: Callable[[Any], float] | None = None
     """Return the report of a result, as plain data; see `plot`."""
     optimizer = result.optimizer
     box, noise = optimizer.box, optimizer.input_noise
+    disturbed = [*["the input is off"] * (noise is not None), *["conditions differ"] * (box.uncontrolled is not None)]
     candidates = []
     for label, index in gather.answers(result).items():
         score = None
-        if function is not None and noise is not None:
+        if function is not None and disturbed:
             problem = Function(function if box.plain else lambda x: function(box.as_dict(x)), box)
             score = robust_score(problem, result.X[index], noise, _REQUERIES, optimizer.seed)
         found = gather.candidate(result, label, index, score)
-        candidates.append(found if score is not None or noise is None else _expected(result, found))
+        candidates.append(found if score is not None or not disturbed else _expected(result, found))
     plain = [box.as_dict(x) for x in result.X]
     texts = [variable.name for variable in box.variables if variable.name not in box.names]
     units = {v.name: "log" for v in box.variables if v.name in box.names and getattr(v, "log", False)}
@@ -70,6 +71,7 @@ def result_report(result: Result, function: Callable[[Any], float] | None = None
         title="Optimization",
         settings={"direction": optimizer.direction, "trials": len(result.y)},
         noise=noise,
+        disturbance=" and ".join(disturbed) or "the input is off",
         units=units,
         choices={name: tuple(str(row[name]) for row in plain) for name in texts},
         hidden=[name for name in box.names if name not in [variable.name for variable in box.variables]],
