@@ -156,7 +156,7 @@ def test_what_was_reached_is_what_the_model_learns_from(robot):
         ({"value": math.nan}, "finite"),
         ({"value": math.inf}, "finite"),
         ({"value": "good"}, "finite"),
-        ({"value": True}, "finite"),
+        ({"value": True}, "told values"),
         ({"value": [1.0, 2.0]}, "finite"),
         ({}, "has no value"),
         ({"value": 1.0, "failed": True}, "has no value, but"),
