@@ -8,6 +8,8 @@ shape    distance of the true surface to the one believed [mm], mean and 95 %, o
          chosen on these
 grasp    a grasp is planned on a half view (1,000 points, 1 mm): on 8 draws of the shape, on the mean surface alone, and
          on the cloud mirrored and believed; then it is queried 200 times on the true shape under input noise
+draws    how far normals of draws and of the mean surface are off [degrees, medians], and the logarithm of the joint
+         density of 80 hidden places and their normals, for each place
 explore  from a box: the true worth of the answer after 10, 20, 40, 50 and 80 trials
 search   the same of optimization that learns no shape, and after 100 trials
 time     of an update of the shape in an exploration that has made 200 contacts
@@ -23,6 +25,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from threadpoolctl import threadpool_limits
 
 import surehold as sh
@@ -32,6 +35,7 @@ from surehold.grasping.object.shipped import OBJECTS, shipped_object
 from surehold.grasping.object.solids import RevolvedProfile, RoundedBox, triangles
 from surehold.grasping.shape.completion import SPREAD, belief_of_cloud
 from surehold.grasping.shape.implicit_surface import Observations
+from surehold.grasping.shape.kernel import covariance
 from surehold.grasping.shape.point_cloud import cleaned
 from surehold.grasping.shape.views import camera_towards, half_view, hidden_mask, surface_points
 from surehold.problems.grasp.default_poses import default_facet
@@ -148,6 +152,62 @@ def grasp(objects, args):
         print(f"robust - {other}: {gain.mean():+.4f} +- {gain.std(ddof=1) / np.sqrt(len(gain)):.4f}, {len(gain)} views")
 
 
+def drawn(objects, args):
+    for name, obj in objects.items():
+        field = distance_field_of(obj)
+        for view in range(args.first, args.first + args.views):
+            key = {"object": name, "view": view, "spread": args.spread, "length": args.length}
+            if known(args, key):
+                continue
+            camera, cloud = view_of(obj, view, 1000, 0.001)
+            belief = belief_of_cloud(cloud, cell=0.004, spread=(args.spread, args.length))
+            mean, *draws = belief.objects(4, np.random.default_rng(0))
+            row = {}
+            for which, bodies in (("mean", [mean]), ("draws", draws)):
+                off = [normals_off(body, field, camera) for body in bodies]
+                row[f"{which}, seen"], row[f"{which}, hidden"] = np.mean(off, axis=0)
+            places, normals = surface_points(obj, 1500, np.random.default_rng(0))
+            hidden = hidden_mask(field, places, camera)
+            row["density"] = joint_density(belief.surface, *farthest(places[hidden], normals[hidden], 80))
+            write(args, key, row)
+    table(args, ("object", "spread", "length"))
+
+
+def normals_off(body, field, camera):
+    """Return the medians of the angles between a body's normals and those of the true surface beside [degrees]."""
+    corners = body.vertices[body.faces]
+    made = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    places = corners.mean(axis=1)
+    true = field.gradient(places)
+    cosine = np.sum(made * true, axis=1) / (np.linalg.norm(made, axis=1) * np.linalg.norm(true, axis=1) + 1e-12)
+    angles = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    hidden = hidden_mask(field, places - field.distance(places)[:, None] * true, camera)
+    return np.median(angles[~hidden]), np.median(angles[hidden])
+
+
+def farthest(places, normals, n):
+    chosen = [0]
+    while len(chosen) < n:
+        gaps = np.linalg.norm(places[:, None] - places[chosen], axis=2).min(axis=1)
+        chosen.append(int(np.argmax(gaps)))
+    return places[chosen], normals[chosen]
+
+
+def joint_density(surface, places, normals):
+    """Return log p(f = 0 and gradient = normal at all places | observations) / places; felt to 0.5 mm and 0.15."""
+    told, n = surface.observations, len(places)
+    both = told + Observations(places, np.zeros(n), np.full(n, 5e-4), places, normals, np.full(n, 0.15))
+    gram = covariance(both.points, both.slope_points, surface.std, surface.length)
+    gram += np.diag(np.concatenate([both.noise, np.repeat(both.slope_noise, 3)]) ** 2 + (1e-6 * surface.std) ** 2)
+    last = np.concatenate([np.arange(n) + len(told.points), np.arange(len(gram) - 3 * n, len(gram))])
+    first = np.setdiff1d(np.arange(len(gram)), last)
+    half = solve_triangular(np.linalg.cholesky(gram[np.ix_(first, first)]), gram[np.ix_(first, last)], lower=True)
+    factor = np.linalg.cholesky(gram[np.ix_(last, last)] - half.T @ half)
+    away = np.concatenate([-surface.value(places), (normals - surface.gradient(places)).ravel()])
+    whitened = solve_triangular(factor, away, lower=True)
+    return -(0.5 * whitened @ whitened + np.log(np.diag(factor)).sum() + 0.5 * len(away) * np.log(2.0 * np.pi)) / n
+
+
 def explore(objects, args):
     for key, problem, belief in explored(objects, args):
         run = Exploration(problem, belief, NOISE, seed=key["seed"])
@@ -245,9 +305,12 @@ def table(args, names):
         print(*group, f"({len(mine)})", ", ".join(shown))
 
 
+RUN = {"shape": shape, "grasp": grasp, "draws": drawn, "explore": explore, "search": search, "time": timed}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("shape", "grasp", "explore", "search", "time"))
+    parser.add_argument("what", choices=tuple(RUN))
     parser.add_argument("--rows", default="/dev/null")
     parser.add_argument("--views", type=int, default=3)
     parser.add_argument("--first", type=int, default=0)
@@ -263,7 +326,7 @@ def main():
     if not args.training:
         objects = {name: own[name] if name in own else shipped_object(name) for name in args.objects.split(",")}
     with threadpool_limits(1):
-        {"shape": shape, "grasp": grasp, "explore": explore, "search": search, "time": timed}[args.what](objects, args)
+        RUN[args.what](objects, args)
 
 
 if __name__ == "__main__":

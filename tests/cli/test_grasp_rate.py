@@ -77,6 +77,11 @@ def changed(block, change):
         (lambda c: c["surehold"].update(friction="x"), "", "friction is 'x'; it must be a number"),
         (lambda c: c["surehold"].update(hand=["x"]), "", "it must be a text"),
         (lambda c: c["surehold"].update(contact="x"), "", "contact model 'x' is unknown"),
+        (
+            lambda c: [g["cspace_position"].update(elbow=0.1) for g in c["grasps"].values()],
+            "",
+            "joints elbow are none of hand",
+        ),
         (lambda c: c.update(object_file="../../elsewhere.obj", surehold={}), "", "is not beside it"),
         (lambda c: c.update(object_file="", surehold={}), "", "names no object; give one with --object"),
         (lambda c: None, "--object nothing", "object 'nothing' is unknown"),

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from surehold.errors import InputError
-from surehold.grasping.formats.gripper import closing_hand, palm_pose
+from surehold.grasping.formats.gripper import check_joints, closing_hand, palm_pose
 from surehold.grasping.formats.stored import GraspFile, StoredGrasp
 from surehold.grasping.grasp import Grasp
 from surehold.grasping.pose_noise import RobustQuality, robust_quality
@@ -55,9 +55,11 @@ def rated_grasps(
     """
     for stored in file.grasps:
         chosen = simulator
-        if stored.quality is None and stored.joints:
+        if stored.joints:
             try:
-                chosen = build(closing_hand(simulator.hand, stored.pregrasp_joints, stored.joints))
+                check_joints(simulator.hand, stored.joints)
+                if stored.quality is None:
+                    chosen = build(closing_hand(simulator.hand, stored.pregrasp_joints, stored.joints))
             except InputError as error:
                 raise InputError(f"grasp {stored.name!r}: {error}") from None
         pose = simulator.object_pose @ palm_pose(simulator.hand, file, stored)

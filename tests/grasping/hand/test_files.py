@@ -161,6 +161,7 @@ def test_only_contact_links_touch(tmp_path, model):
         ({"palm__body": "nobody"}, ("body 'nobody' is unknown", "palm, a, b, c, d")),
         ({"palm__x": [0, 0, 2]}, ("two directions",)),
         ({"palm__z": [0, 0, 0]}, ("two directions",)),
+        ({"palm__x": [0, 0, 0]}, ("two directions",)),
         ({"palm__z": [0, 0, float("nan")]}, ("palm.z.2", "finite")),
         ({"palm__z": [0, 1]}, ("palm.z",)),
         ({"palm__grasp_center": [0, 0, 50.0]}, ("grasp_center", "in meters")),
@@ -211,6 +212,7 @@ def test_models_that_are_none(tmp_path, monkeypatch):
             "q.stl",
         ),
         "far.xml": (MODEL.replace('pos="0 0 .05"', 'pos="0 0 500"'), "takes lengths as meters"),
+        "endless.xml": (MODEL.replace('pos="0 0 .05"', 'pos="0 0 1e300"'), "parts 1e+300 m apart"),
         "nan.xml": (MODEL.replace('pos="0 0 .05"', 'pos="0 0 nan"'), "not finite"),
     }
     for name, (text, reason) in cases.items():

@@ -65,3 +65,15 @@ def test_a_finger_that_rests_in_one_preshape_is_in_order():
     assert moves["ring"] < 0.01 < moves["index"]
     still = replace(hand, preshapes={"pinch": hand.preshapes["pinch"]._replace(rate=np.zeros_like(hand.lower))})
     assert sum("never moves" in fault for fault in hand_faults(still)) == 5
+
+
+def test_a_hand_of_one_finger(tmp_path):
+    path = tmp_path / "hand.xml"
+    path.write_text(five_fingers())
+    config = propose_hand(path).config.model_dump()
+    finger, joints = next(iter(config["fingers"].items()))
+    closed = next(iter(config["preshapes"].values()))["closed"]
+    config["fingers"] = {finger: joints}
+    config["preshapes"] = {"close": {"closed": {joint: angle for joint, angle in closed.items() if joint in joints}}}
+    faults = hand_faults(load_hand(path, HandConfig.model_validate(config)))
+    assert f"'{finger}' is its only finger: it can press an object against the palm alone." in faults

@@ -17,7 +17,15 @@ from surehold.grasping.grasp import Grasp
 from surehold.grasping.hand.model import CLOSED, Hand, Preshape
 from surehold.grasping.poses import Pose
 
-__all__ = ["closing_hand", "described_gripper", "in_root_frame", "joint_order", "palm_pose", "stored_grasp"]
+__all__ = [
+    "check_joints",
+    "closing_hand",
+    "described_gripper",
+    "in_root_frame",
+    "joint_order",
+    "palm_pose",
+    "stored_grasp",
+]
 
 Array = NDArray[np.float64]
 
@@ -105,7 +113,8 @@ def closing_hand(hand: Hand, opened: Mapping[str, float], closed: Mapping[str, f
     return replace(hand, preshapes={"file": Preshape(start, rate, np.zeros_like(start), none, none, (0.0,))})
 
 
-def _by_name(hand: Hand, values: Mapping[str, float], rest: Array) -> Array:
+def check_joints(hand: Hand, values: Mapping[str, float]) -> None:
+    """Raise InputError if a name of a file's joints is neither of the hand nor of its model, or none is the hand's."""
     known = [name for name in hand.joint_names if name]
     also = hand.model.joints if hand.model else ()
     strange = [name for name in values if name not in known and name not in also]
@@ -114,6 +123,10 @@ def _by_name(hand: Hand, values: Mapping[str, float], rest: Array) -> Array:
             f"the file's joints {_few(strange or list(values))} are none of hand '{hand.name}', which has "
             f"{_few(known)}; give the hand of the file with --hand."
         )
+
+
+def _by_name(hand: Hand, values: Mapping[str, float], rest: Array) -> Array:
+    check_joints(hand, values)
     joints = rest.copy().ravel()
     for i, name in enumerate(hand.joint_names):
         if name in values:

@@ -9,7 +9,9 @@ import importlib
 import importlib.util
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
 
 from surehold.errors import InputError
 from surehold.grasping.hand.building import built_hand
@@ -20,6 +22,8 @@ from surehold.grasping.hand.urdf import read_urdf
 from surehold.grasping.plain_data import regular_bytes
 
 __all__ = ["load_hand", "packaged_hand", "read_model"]
+
+_FARTHEST: Final = 1e6  # of a part from the one that carries it [m]: farther off, squares overflow
 
 
 def load_hand(model: str | Path, config: str | Path | HandConfig) -> Hand:
@@ -55,12 +59,16 @@ def read_model(model: str | Path) -> tuple[Any, Any]:
         raise InputError(f"{str(model)!r} is no model of a hand; give an .xml (MJCF) or .urdf file.")
     regular_bytes(path)  # MuJoCo reads the file itself, and a pipe might never end
     try:
-        return mujoco, _compiled(mujoco, path)
+        compiled = _compiled(mujoco, path)
     except InputError:
         raise
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())[:160]
         raise InputError(f"{str(model)!r} is not a model that MuJoCo can read: {reason}.") from None
+    far = max(float(np.abs(places).max(initial=0.0)) for places in (compiled.body_pos, compiled.jnt_pos))
+    if far > _FARTHEST:
+        raise InputError(f"{str(model)!r} places its parts {far:.3g} m apart; MuJoCo takes lengths as meters.")
+    return mujoco, compiled
 
 
 def packaged_hand(config: str | Path) -> Hand:

@@ -1,4 +1,7 @@
-"""What is wrong with a hand, as far as its own motion tells: palm turned over, open and closed exchanged, no motion."""
+"""What is wrong with a hand, as far as its own motion tells: palm turned over, open and closed exchanged, no motion.
+
+A hand of a single finger is told, too.
+"""
 
 from typing import Final, NamedTuple
 
@@ -44,6 +47,7 @@ def hand_faults(hand: Hand, preshape: str | None = None) -> list[str]:
     - Open and closed are exchanged: when the hand is closed, the tips that move are at least 2 mm farther from their
       middle, and from the grasp center, than when it is open.
     - A finger never moves: its tip stays within 1 mm in every preshape of the hand.
+    - It is the only finger, which has nothing but the palm to press against.
     """
     every = {name: finger_motions(hand, name) for name in hand.preshapes}
     faults = []
@@ -66,4 +70,6 @@ def hand_faults(hand: Hand, preshape: str | None = None) -> list[str]:
     for f, finger in enumerate(hand.finger_names):
         if max(motions[f].moves for motions in every.values()) <= _STILL:
             faults.append(f"Finger '{finger}' never moves: name a joint of it in 'closed' of a preshape.")
+    if len(hand.finger_names) == 1:
+        faults.append(f"'{hand.finger_names[0]}' is its only finger: it can press an object against the palm alone.")
     return faults

@@ -51,7 +51,7 @@ class RestingModel:
             raise unknown_name("body", palm.body, self.body_names)
         self.palm_body = self.body_ids[palm.body]
         z, x = np.asarray(palm.z), np.asarray(palm.x)
-        if np.linalg.norm(z) < 1e-6 or np.linalg.norm(np.cross(z, x)) < 1e-3 * np.linalg.norm(z) * np.linalg.norm(x):
+        if np.linalg.norm(z) < 1e-6 or np.linalg.norm(np.cross(z, x)) <= 1e-3 * np.linalg.norm(z) * np.linalg.norm(x):
             raise InputError(f"hand '{config.name}': palm.x {palm.x} and palm.z {palm.z} must point in two directions.")
         z = z / np.linalg.norm(z)
         x = x - (x @ z) * z
