@@ -9,7 +9,7 @@ grasp: .venv/.installed
 	$(BIN)/surehold grasp mug
 
 test: .venv/.developer
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto
 
 # Tests by property with new random examples, many more of them; before a release.
 explore: .venv/.developer
