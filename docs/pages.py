@@ -106,16 +106,10 @@ def _reference(package: str, about: str) -> str:
     groups: dict[str, list[str]] = {"Classes": [], "Functions": [], "Errors": [], "Constants": []}
     for name in public_names(package):
         value = getattr(module, name)
-        raised = inspect.isclass(value) and issubclass(value, Exception)
-        kind = (
-            "Errors"
-            if raised
-            else "Classes"
-            if inspect.isclass(value)
-            else "Functions"
-            if callable(value)
-            else "Constants"
-        )
+        if inspect.isclass(value):
+            kind = "Errors" if issubclass(value, Exception) else "Classes"
+        else:
+            kind = "Functions" if callable(value) else "Constants"
         groups[kind].append(name)
     parts = [package, "=" * len(package), "", about, "", f".. currentmodule:: {package}", ""]
     for title, names in groups.items():

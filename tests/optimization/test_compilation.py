@@ -19,7 +19,7 @@ class Compiled(event.Listener):
     def on_end(self, event): pass
 with event.install_listener("numba:compile", Compiled()):
     import surehold as sh
-    optimizer = sh.Optimizer(sh.Box.unit(3), n_initial=6, seed=1, **{settings})
+    optimizer = sh.Optimizer(sh.Box.unit(3), n_initial=8, seed=1, **{settings})
     imported = len(Compiled.names)
     for _ in range(12):
         x = optimizer.ask()

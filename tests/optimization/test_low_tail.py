@@ -9,6 +9,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 import surehold as sh
 from surehold.optimization.assembly import assembled
 from surehold.optimization.low_tail import LowTail, low_tail_of
+from surehold.optimization.trials import Trials
 
 
 def valley(X):
@@ -47,9 +48,7 @@ def test_it_is_chosen_as_an_independent_process_would(response, compressed):
 
     gain = log_evidence(tail.apply(y)) + tail.log_slopes(y).sum() - log_evidence(y)
     assert (gain > 0.0) == compressed
-    found = low_tail_of(X, y)
-    assert np.isfinite(found.size) == compressed
-    assert not compressed or found == tail
+    assert low_tail_of(X, y) == (tail if compressed else None)
 
 
 @pytest.mark.parametrize("scale", [1e-100, 1e150])
@@ -64,7 +63,7 @@ def test_units_do_not_matter(scale):
 )
 def test_values_that_say_nothing_stay_as_they_are(y):
     y = np.asarray(y)
-    assert np.array_equal(low_tail_of(places(16, 2)[: len(y)], y).apply(y), y)
+    assert low_tail_of(places(16, 2)[: len(y)], y) is None
 
 
 def test_the_model_that_is_shown_is_of_the_values_as_they_were_told():
@@ -74,7 +73,7 @@ def test_the_model_that_is_shown_is_of_the_values_as_they_were_told():
     deepest = int(np.argmin(valley(X)))
     optimizer.ask()
     assert optimizer.predict(X[[deepest]])[0][0] == pytest.approx(valley(X)[deepest], rel=1e-3)
-    assert np.isfinite(low_tail_of(X, valley(X)).size)
+    assert low_tail_of(X, valley(X)) is not None
 
 
 def test_a_valley_of_thousands_does_not_blur_the_top():
@@ -108,6 +107,19 @@ def test_a_valley_of_thousands_does_not_blur_the_top():
     ],
 )
 def test_it_is_part_of_searches_for_the_highest_value_alone(settings, own):
-    box = sh.Box.unit(2)
-    parts = assembled(box, sh.Optimizer(box, **settings)._settings)
-    assert (parts.search is not parts.model) == own
+    box, X = sh.Box.unit(2), places(32, 2)
+    trials = Trials(box)
+    for x, y in zip(X, valley(X), strict=True):
+        trials.tell(x, y, False, None)
+    model = assembled(box, sh.Optimizer(box, **settings)._settings).model
+    assert np.array_equal(model.values_of_search(trials), trials.modelled) != own
+    assert not own or model.posterior_of_search(trials) is not model.posterior(trials)
+
+
+def test_where_values_stay_as_they_are_one_model_serves_both():
+    box, X = sh.Box.unit(2), places(32, 2)
+    trials = Trials(box)
+    for x, y in zip(X, ripple(X), strict=True):
+        trials.tell(x, y, False, None)
+    model = assembled(box, sh.Optimizer(box)._settings).model
+    assert model.posterior_of_search(trials) is model.posterior(trials)

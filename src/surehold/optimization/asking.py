@@ -72,7 +72,7 @@ class Asking:
         self, trials: Trials, posterior: Callable[[], Posterior], rng: np.random.Generator
     ) -> NDArray[np.float64]:
         strategy, requirements = self._parts.strategy, self._parts.requirements
-        history = history_of(trials, requirements, self._parts.search.values(trials))
+        history = history_of(trials, requirements, self._parts.model.values_of_search(trials))
         if len(history.tried):
             candidates = strategy.candidates(posterior(), history, rng)
         elif requirements is not None:

@@ -54,8 +54,6 @@ class Parts:
     lattice: Lattice | None
     limits: tuple[Limit, ...]
     model: ResponseModel
-    search: ResponseModel
-    """that by which trials are chosen: the same, but where deep values may be compressed"""
     strategy: Strategy
     requirements: Requirements | None
     design: NDArray[np.float64]
@@ -140,18 +138,18 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
             "noise_while_exploring needs input_noise= and a surrogate that takes the noise of single trials "
             "('two_scales', 'gp', 'tgp', or an object with known_noise), without a thesis preset."
         )
-    learning: dict[str, Any] = {
-        "straying": straying,
-        "lattice": lattice,
-        "continues_chains": strategy.continues_chains,
-        "seed": seed,
-        "told": told,
-    }
-    model = search = ResponseModel(surrogate, box, **learning)
     limits = limits_of(s.constraints)
-    exact = strategy.ranking.exact_inputs and not strategy.ranking.noisy
-    if exact and thesis is None and isinstance(surrogate, GaussianProcess) and all(limit.watched for limit in limits):
-        search = ResponseModel(surrogate, box, **learning, compressed=True)
+    exact = thesis is None and strategy.ranking.exact_inputs and not strategy.ranking.noisy
+    model = ResponseModel(
+        surrogate,
+        box,
+        straying=straying,
+        lattice=lattice,
+        continues_chains=strategy.continues_chains,
+        seed=seed,
+        told=told,
+        compressed=exact and isinstance(surrogate, GaussianProcess) and all(limit.watched for limit in limits),
+    )
     for limit in limits:
         if limit.name in box.names:
             raise InputError(
@@ -186,7 +184,6 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
         lattice=lattice,
         limits=limits,
         model=model,
-        search=search,
         strategy=strategy,
         requirements=requirements,
         design=np.concatenate([first, rest]),

@@ -35,12 +35,10 @@ class LowTail(NamedTuple):
     middle: float
     """m"""
     size: float
-    """S, positive; infinite where values stay as they are"""
+    """S, positive"""
 
     def apply(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return z (t,)."""
-        if not np.isfinite(self.size):
-            return y
         return np.where(y < self.middle, self.middle - self.size * np.log1p(self._depth(y)), y)
 
     def log_slopes(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -51,25 +49,24 @@ class LowTail(NamedTuple):
         return np.maximum(self.middle - y, 0.0) / self.size
 
 
-def low_tail_of(X: NDArray[np.float64], y: NDArray[np.float64]) -> LowTail:
-    """Return how the values y (t,) at X (t, d) of the unit cube are compressed.
+def low_tail_of(X: NDArray[np.float64], y: NDArray[np.float64]) -> LowTail | None:
+    """Return how the values y (t,) at X (t, d) of the unit cube are compressed; None where they stay as they are.
 
     It rests on the trials from which hyperparameters are learnt, so that it seldom changes.
     """
     k = learnt_from(len(y))
     some = slice(0, k, -(-k // MANY_LEARNT))
     X, y = X[some], y[some]
-    unchanged = LowTail(0.0, np.inf)
     if len(y) < LOW_TAIL_FROM:
-        return unchanged
+        return None
     middle = float(np.median(y))
     tail = LowTail(middle, float(y.max()) - middle)
     with np.errstate(all="ignore"):
         z = tail.apply(y)
     if tail.size <= 0.0 or not np.all(np.isfinite(z)):
-        return unchanged
+        return None
     gain = _log_evidence(X, z) + float(tail.log_slopes(y).sum()) - _log_evidence(X, y)
-    return tail if gain > 0.0 else unchanged
+    return tail if gain > 0.0 else None
 
 
 def _log_evidence(X: NDArray[np.float64], y: NDArray[np.float64]) -> float:

@@ -201,7 +201,6 @@ class Optimizer(Record):
         self._lattice: Final = parts.lattice
         self._strategy: Final = parts.strategy
         self._model: Final = parts.model
-        self._search: Final = parts.search
         self._requirements: Final = parts.requirements
         self._asking: Final = Asking(box, parts, self._conditions_measured)
         compile_ahead(given)
@@ -223,7 +222,6 @@ class Optimizer(Record):
 
     def _replaced(self) -> None:
         self._model.forget()
-        self._search.forget()
         if self._requirements is not None:
             self._requirements.forget()
 
@@ -284,7 +282,9 @@ class Optimizer(Record):
     def _ask_one(self, number: int | None) -> AskedTrial:
         position = self._trials.next_number if number is None else whole_number("number", number, 0)
         modelled = self._modelled
-        u = self._asking.place(self._trials, position, number is not None, lambda: self._search.posterior(modelled))
+        u = self._asking.place(
+            self._trials, position, number is not None, lambda: self._model.posterior_of_search(modelled)
+        )
         x = self.box.from_unit(u)
         return AskedTrial(self._trials.ask(position, u), x, self.box.as_dict(x))
 

@@ -73,7 +73,7 @@ class ResponseModel:
     screened
         Whether failed trials and outliers count as the lowest other value; else all must have given a value.
     compressed
-        Whether deep values are compressed where the trials speak for it; see `low_tail`.
+        Whether deep values are compressed in the search where the trials speak for it; see `low_tail`.
     """
 
     def __init__(
@@ -98,59 +98,72 @@ class ResponseModel:
         self._told: Final = told
         self._screened: Final = screened
         self._compressed: Final = compressed
-        self._low_tail: tuple[int, LowTail] | None = None
-        self._cache: tuple[int, Posterior] | None = None
+        self._low_tail: tuple[int, LowTail | None] | None = None
+        self._cache: dict[bool, tuple[int, Posterior]] = {}  # by whether deep values are compressed
 
     def forget(self) -> None:
-        """Drop the posterior: the trials are others from now on."""
-        self._cache = self._low_tail = None
-
-    def values(self, trials: Trials) -> NDArray[np.float64]:
-        """Return what is learnt from each trial, (t,); NaN if every trial failed."""
-        if not self._screened:
-            return trials.values
-        values, told = trials.modelled, trials.successful
-        if not self._compressed or not told.any():
-            return values
-        k = learnt_from(int(told.sum()))
-        if self._low_tail is None or self._low_tail[0] != k:
-            with single_threaded():
-                self._low_tail = k, low_tail_of(trials.reached[told], values[told])
-        return self._low_tail[1].apply(values)
+        """Drop what was learnt: the trials are others from now on."""
+        self._low_tail = None
+        self._cache.clear()
 
     def posterior(self, trials: Trials) -> Posterior:
         """Return the surrogate conditioned on the trials told so far; inputs in the unit cube.
 
         Raises InputError if no trial has given a value yet.
         """
-        t = len(trials)
+        return self._posterior(trials, None)
+
+    def posterior_of_search(self, trials: Trials) -> Posterior:
+        """Return the posterior by which trials are chosen: the same, or of values whose low tail is compressed."""
+        return self._posterior(trials, self._tail(trials))
+
+    def values_of_search(self, trials: Trials) -> NDArray[np.float64]:
+        """Return the values (t,) that `posterior_of_search` is learnt from; NaN if every trial failed."""
+        tail = self._tail(trials)
+        return trials.modelled if tail is None else tail.apply(trials.modelled)
+
+    def _tail(self, trials: Trials) -> LowTail | None:
+        told = trials.successful
+        if not self._compressed or not told.any():
+            return None
+        k = learnt_from(int(told.sum()))
+        if self._low_tail is None or self._low_tail[0] != k:
+            background.wait()
+            with single_threaded():
+                self._low_tail = k, low_tail_of(trials.reached[told], trials.modelled[told])
+        return self._low_tail[1]
+
+    def _posterior(self, trials: Trials, tail: LowTail | None) -> Posterior:
+        t, kind = len(trials), tail is not None
         if not trials.successful.any():
             raise InputError("no trial has given a value yet; tell the outcome of at least one.")
-        if self._cache is not None and self._cache[0] == t:
-            return self._cache[1]
+        if kind in self._cache and self._cache[kind][0] == t:
+            return self._cache[kind][1]
         background.wait()
         with single_threaded():
-            posterior = self._conditioned(trials)
+            posterior = self._conditioned(trials, tail)
         if self._lattice is not None:
             posterior = LatticePosterior(posterior, self._lattice)
-        self._cache = (t, posterior)
+        self._cache[kind] = (t, posterior)
         return posterior
 
-    def _conditioned(self, trials: Trials) -> Posterior:
+    def _conditioned(self, trials: Trials, tail: LowTail | None) -> Posterior:
         model: Any = self._surrogate
         if isinstance(model, (SuccessProcess, BetaProcess)):
             rng = np.random.default_rng([self._seed, 1, 0])
             return model.condition(trials.reached, trials.values, rng, trials=trials.executions.astype(np.float64))
         if isinstance(model, PreferenceProcess):
             return model.condition(trials.reached, trials.pairs, np.random.default_rng([self._seed, 1, 0]))
-        values = self.values(trials)
+        values = trials.modelled if self._screened else trials.values
+        if tail is not None:
+            values = tail.apply(values)
         if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
             roots = self._straying.unit_roots(self._box, trials.commanded).copy()
             roots[trials.reported] = 0.0
             told = trials.deviations if self._told else None
             return condition_on_noisy_inputs(self._surrogate, trials.reached, values, roots, [self._seed, 1, 0], told)
         # One random stream for all, so that what some trials taught stays as it was when others follow.
-        previous = self._cache[1] if self._continues_chains and self._cache is not None else None
+        previous = self._cache[False][1] if self._continues_chains and self._cache else None
         rng = np.random.default_rng([self._seed, 1, len(trials) if self._continues_chains else 0])
         if self._told and isinstance(self._surrogate, NoisySurrogate):
             return self._surrogate.condition(trials.reached, values, rng, previous, trials.deviations)

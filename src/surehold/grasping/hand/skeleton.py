@@ -228,16 +228,15 @@ class _Tree:
             if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
                 if model.eq_objtype[e] == int(self.mujoco.mjtObj.mjOBJ_SITE):
                     ends = [int(model.site_bodyid[end]) for end in ends]
-                tied, groups = (
-                    closed,
-                    [
-                        {leaf for leaf, chain in chains.items() if chain and self._is_below(end, self._body(chain[-1]))}
-                        for end in ends
-                    ],
-                )
+                tied = closed
+                groups = [
+                    {leaf for leaf, chain in chains.items() if chain and self._is_below(end, self._body(chain[-1]))}
+                    for end in ends
+                ]
             elif kind in (int(kinds.mjEQ_JOINT), int(kinds.mjEQ_TENDON)):
                 joints = ends if kind == int(kinds.mjEQ_JOINT) else self._of_tendon(ends[0])
-                tied, groups = coupled, [{leaf for leaf, chain in chains.items() if j in chain} for j in joints]
+                tied = coupled
+                groups = [{leaf for leaf, chain in chains.items() if j in chain} for j in joints]
             else:
                 continue
             for group in groups:
