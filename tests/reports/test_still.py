@@ -68,3 +68,18 @@ def test_what_is_nearer_hides_what_is_behind(monkeypatch):
     gone = replace(near, poses=poses)
     picture = pixels(still.still_picture(Scene((far, gone), view=(0.0, -1.0, 0.0)), 200, 200)[0])
     assert picture[100, 100, 2] > 0.4, "its last pose is behind the other"
+
+
+def test_a_long_triangle_hides_nothing_that_is_nearer(monkeypatch):
+    """Its middle is nearer than the small square, but where the two overlap it lies behind."""
+    without_graphics(monkeypatch)
+    small = np.array([[-0.01, 0.0, -0.01], [0.01, 0.0, -0.01], [0.01, 0.0, 0.01], [-0.01, 0.0, 0.01]])
+    strip = np.array([[-0.02, 0.06, -0.02], [0.3, -0.4, -0.02], [0.3, -0.4, 0.02], [-0.02, 0.06, 0.02]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    scene = Scene((SceneMesh("small", small, faces, "#ff0000"), SceneMesh("strip", strip, faces, "#0000ff")))
+    picture = pixels(still.still_picture(replace(scene, view=(0.0, -1.0, 0.0)), 400, 100)[0])
+    red = (picture[..., 0] > 0.4) & (picture[..., 2] < 0.1)
+    shape = red.any(axis=1).sum(), red.any(axis=0).sum()
+    assert min(shape) > 10
+    assert red.sum() > 0.9 * shape[0] * shape[1]
+    assert shape[0] == pytest.approx(shape[1], rel=0.15)

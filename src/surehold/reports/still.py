@@ -13,6 +13,7 @@ __all__ = ["placed", "still_picture"]
 
 _CONTEXTS: Final = ("mujoco.egl", "mujoco.osmesa")
 _SEE_THROUGH: Final = 0.55
+_FINEST: Final = 0.025  # longest edge that is painted in one go, in sizes of the scene: long ones lie before and behind
 
 
 def still_picture(scene: Scene, width: int = 960, height: int = 720) -> tuple[bytes, str]:
@@ -100,6 +101,22 @@ def _png(pixels: NDArray[np.uint8]) -> bytes:
     return content.getvalue()
 
 
+def _divided(triangles: NDArray[np.float64], most: float) -> NDArray[np.float64]:
+    """Return triangles (k, 3, 3) that cover those given (t, 3, 3), none with an edge longer than `most`."""
+    done = []
+    while len(triangles):
+        edges = np.linalg.norm(
+            np.roll(triangles, -1, axis=1) - triangles, axis=2
+        )  # (t, 3), from each corner to the next
+        long = edges.max(axis=1) > most
+        done.append(triangles[~long])
+        triangles, longest = triangles[long], edges[long].argmax(axis=1)
+        a, b, c = (triangles[np.arange(len(triangles)), (longest + i) % 3] for i in range(3))
+        middle = 0.5 * (a + b)
+        triangles = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return np.concatenate(done)
+
+
 def _by_matplotlib(scene: Scene, width: int, height: int) -> bytes:
     """Draw all triangles from the farthest to the nearest, in parallel projection."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -112,9 +129,10 @@ def _by_matplotlib(scene: Scene, width: int, height: int) -> bytes:
     right = right / np.linalg.norm(right)
     axes = np.column_stack([right, np.cross(back, right), back])  # to the right, up, and towards the eye
     lamp = np.array([0.3, 0.5, 1.0]) / np.linalg.norm([0.3, 0.5, 1.0])
+    finest = _FINEST * float(np.ptp(np.vstack([placed(mesh) for mesh in scene.meshes]), axis=0).max())
     corners, colors = [], []
     for mesh in scene.meshes:
-        triangles = (placed(mesh) @ axes)[np.asarray(mesh.faces)]
+        triangles = _divided((placed(mesh) @ axes)[np.asarray(mesh.faces)], finest)
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-18)[:, None]
         seen = normals[:, 2] > 0.0
