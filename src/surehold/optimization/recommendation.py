@@ -154,8 +154,8 @@ def outliers_in_words(numbers: Sequence[int]) -> str:
     several = len(numbers) > 1
     return (
         f"{'Trials' if several else 'Trial'} {', '.join(map(str, numbers))} gave {'values' if several else 'a value'} "
-        f"so far on the bad side of all others that {'they count' if several else 'it counts'} as failed; tell a trial "
-        "that gave no measurement as failed instead of with a penalty."
+        f"so far on the bad side of all others that {'they count' if several else 'it counts'} as the worst of those. "
+        "Nothing is to be done if that is how the place is; a trial that gave no measurement is better told as failed."
     )
 
 
