@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from surehold.extras import require
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning
-from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, NoiseName
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 

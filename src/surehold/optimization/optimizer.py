@@ -29,7 +29,7 @@ from surehold.optimization.record import Record
 from surehold.optimization.strategy.promise import promise
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.success import described
-from surehold.optimization.surrogates.gaussian_process.model import NoiseName
+from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
 from surehold.optimization.surrogates.protocol import Posterior, Surrogate, mixture
 from surehold.optimization.surrogates.success.preference import PreferencePosterior
 from surehold.optimization.trials import AskedTrial, Trials

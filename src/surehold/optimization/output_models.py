@@ -13,7 +13,8 @@ from surehold.optimization.lattice import Lattice
 from surehold.optimization.limits import Limit
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.response_model import ResponseModel
-from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, NoiseName
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
 from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.trials import Trials
 

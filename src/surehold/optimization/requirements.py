@@ -32,7 +32,7 @@ from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.output_models import OutputModels
 from surehold.optimization.recommendation import Recommendation, execution_at
 from surehold.optimization.strategy.ranking import History, Ranking
-from surehold.optimization.surrogates.gaussian_process.model import NoiseName
+from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
 from surehold.optimization.trials import Trials, same
 
 __all__ = ["Requirements"]

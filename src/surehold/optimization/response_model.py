@@ -13,7 +13,8 @@ from surehold.optimization.low_tail import LowTail, low_tail_of
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.strategy.thesis import ThesisConstants
-from surehold.optimization.surrogates.gaussian_process.model import NoiseName, learnt_from
+from surehold.optimization.surrogates.gaussian_process.model import learnt_from
+from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
 from surehold.optimization.surrogates.named import DEFAULT_SURROGATE, refuse_settings, surrogate_named
 from surehold.optimization.surrogates.noisy_inputs import condition_on_noisy_inputs
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, Surrogate

@@ -7,11 +7,8 @@ from numpy.typing import NDArray
 
 from surehold.defaults import CONSTANT_MEAN_VARIANCE
 from surehold.errors import InputError, unknown_name
-from surehold.optimization.surrogates.gaussian_process.model import (
-    GaussianProcess,
-    NoiseName,
-    checked_noise_setting,
-)
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.gaussian_process.observations import NoiseName, checked_noise_setting
 from surehold.optimization.surrogates.gaussian_process.outputs import checked_range
 from surehold.optimization.surrogates.local_global import LocalGlobalProcess
 from surehold.optimization.surrogates.protocol import Surrogate

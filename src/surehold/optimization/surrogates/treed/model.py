@@ -16,12 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.defaults import LEAF_MARGIN, LEAF_SIZES, MIN_LEAF, UNDIVIDED, WIDEST_LEAF_MARGIN
 from surehold.errors import InputError
 from surehold.optimization.numerics.threads import single_threaded
-from surehold.optimization.surrogates.gaussian_process.model import (
-    GaussianProcess,
-    checked_data,
-    checked_noise,
-    fingerprint,
-)
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, fingerprint
+from surehold.optimization.surrogates.gaussian_process.observations import checked_data, checked_noise
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 from surehold.optimization.surrogates.protocol import Posterior, mixture
