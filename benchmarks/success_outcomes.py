@@ -140,9 +140,8 @@ def table_of(name, rows, budgets):
         seeds = sorted(set(mine) & set(found.get("success", mine)))
         table = np.array([mine[seed] for seed in seeds])
         less = np.array([found["success"][seed] for seed in seeds]) - table if "success" in found else 0.0 * table
-        print(
-            f"{name:16s} {method:8s} after {budgets}: {cells(table)}   success less this: {cells(less)}  ({len(seeds)} seeds)"
-        )
+        both = f"{cells(table)}   success less this: {cells(less)}"
+        print(f"{name:16s} {method:8s} after {budgets}: {both}  ({len(seeds)} seeds)")
 
 
 def cells(table):
