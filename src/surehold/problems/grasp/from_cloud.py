@@ -34,7 +34,8 @@ def object_of_cloud(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
     belief, line = belief_of_file(words)
     mean, *draws = belief.objects(shapes, np.random.default_rng(0))
     size = " x ".join(f"{2e3 * half:.0f}" for half in mean.box_half_extents)
-    return replace(mean, draws=tuple(draws)), f"{line}; mean shape {size} mm, {1e3 * mean.mass:.3g} g"
+    known = replace(mean, draws=tuple(draws), deviation=belief.surface.deviation(mean.vertices))
+    return known, f"{line}; mean shape {size} mm, {1e3 * mean.mass:.3g} g"
 
 
 def belief_of_file(words: Mapping[str, Any]) -> tuple[ShapeBelief, str]:
