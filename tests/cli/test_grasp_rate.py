@@ -124,6 +124,11 @@ def changed(block, change):
             "",
             "joints elbow are none of hand",
         ),
+        (
+            lambda c: next(iter(c["grasps"].values())).update(posture=[0.1, 0.2]),
+            "",
+            "grasp 'recommended': 2 amplitudes are given",
+        ),
         (lambda c: c.update(object_file="../../elsewhere.obj", surehold={}), "", "is not beside it"),
         (lambda c: c.update(object_file="", surehold={}), "", "names no object; give one with --object"),
         (lambda c: None, "--object nothing", "object 'nothing' is unknown"),
