@@ -3,6 +3,7 @@
 import json
 from copy import deepcopy
 
+import numpy as np
 import pytest
 import trimesh
 import yaml
@@ -10,6 +11,7 @@ import yaml
 from surehold.cli import run
 from surehold.grasping import Simulator
 from surehold.grasping.formats import read_grasps
+from surehold.problems.grasp.stored import described_file, stored_words
 
 
 @pytest.fixture(autouse=True)
@@ -48,6 +50,46 @@ def test_a_run_is_rated_as_it_was(block, capsys):
     assert "friction 0.3" in rated("held/grasps.yaml --friction 0.3", capsys)
 
 
+def test_what_was_said_of_the_mesh_is_kept_with_the_grasps(here, capsys):
+    """A box turned by 45 degrees: its principal axes give another torque length than the axes of the file."""
+    box = trimesh.creation.box((0.05, 0.05, 0.12))
+    box.apply_transform(trimesh.transformations.rotation_matrix(0.8, (1, 0, 0))).export("turned.stl")
+    line = "grasp turned.stl --unit m --frame file --trials 3 --initial 3 --noise none --method bo --variables dx,dy,dz"
+    run([*line.split(), "--facet", "top-left", "--seed", "1", "--out", "turned"])
+    before = rated("turned/grasps.yaml", capsys)
+    assert yaml.safe_load((here / "turned" / "grasps.yaml").read_text())["surehold"]["frame"] == "file"
+    (here / "turned.stl").unlink()
+    words = described_file("turned/grasps.yaml", {})
+    assert words.object.axes.tolist() == np.eye(3).tolist()
+    assert before.split("on turned")[1] == rated("turned/grasps.yaml", capsys).split("on turned")[1]
+
+
+def test_the_mass_of_a_cloud_is_kept():
+    assert stored_words({"object": "", "cloud": "scan.ply", "unit": "mm", "mass": 0.7}) == {"mass": 0.7}
+
+
+def test_an_option_that_is_given_counts_where_it_is_the_default(block, capsys):
+    changed(block, lambda c: c["surehold"].update(contact="single"))
+    assert "with single contacts" in rated("held/grasps.yaml", capsys)
+    assert "with graded contacts" in rated("held/grasps.yaml --contact graded", capsys)
+
+
+def test_a_hand_that_is_not_there_is_said_to_be_of_the_file(block, capsys):
+    changed(block, lambda c: c["surehold"].update(hand="gone/hand.yaml"))
+    capsys.readouterr()
+    assert run(["grasp", "rate", "held/grasps.yaml"]) == 2
+    error = " ".join(capsys.readouterr().err.split())
+    assert "was made with hand 'gone/hand.yaml': cannot read" in error
+    assert "Give --hand" in error
+    assert "of hand icub-left" in rated("held/grasps.yaml --hand icub-left", capsys)
+
+
+def test_the_check_says_what_it_weighs(block, capsys):
+    assert "squeezed with 8 N a finger" in rated("held/grasps.yaml --check", capsys)
+    assert ", 0.2 kg." in rated("held/grasps.yaml --check", capsys)
+    assert ", 0.3 kg." in rated("held/dexgraspbench/grasps --check", capsys), "of water: the format holds no mass"
+
+
 def test_a_name_in_brackets_is_shown_whole(block, capsys):
     content = yaml.safe_load((block / "grasps.yaml").read_text())
     content["grasps"] = {"[bold]": next(iter(content["grasps"].values()))}
@@ -81,6 +123,11 @@ def changed(block, change):
             lambda c: [g["cspace_position"].update(elbow=0.1) for g in c["grasps"].values()],
             "",
             "joints elbow are none of hand",
+        ),
+        (
+            lambda c: next(iter(c["grasps"].values())).update(posture=[0.1, 0.2]),
+            "",
+            "grasp 'recommended': 2 amplitudes are given",
         ),
         (lambda c: c.update(object_file="../../elsewhere.obj", surehold={}), "", "is not beside it"),
         (lambda c: c.update(object_file="", surehold={}), "", "names no object; give one with --object"),

@@ -10,6 +10,7 @@ from surehold.errors import InputError
 from surehold.grasping.object.distance_field import distance_field_of
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.shape.views import camera_towards, half_view
+from tests.grasping.hand_models import three_fingers
 
 
 @pytest.fixture(autouse=True)
@@ -208,6 +209,15 @@ def test_a_robot_tells_contacts_and_the_next_trial_follows_from_them(here, capsy
     capsys.readouterr()
     assert surehold("study recommend cup --json") == 0
     assert json.loads(capsys.readouterr().out)["trial"] == 0
+
+
+def test_files_of_a_study_are_found_from_any_folder(here, monkeypatch):
+    (here / "hand.xml").write_text(three_fingers())
+    assert surehold("hand new hand.xml") == 0
+    assert surehold("explore --box 0.04,0.04,0.1 --study cup --hand hand.yaml --storage journal.log") == 0
+    (here / "elsewhere").mkdir()
+    monkeypatch.chdir(here / "elsewhere")
+    assert surehold("study ask cup --storage ../journal.log --json") == 0
 
 
 @pytest.mark.parametrize(

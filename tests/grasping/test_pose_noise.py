@@ -89,6 +89,7 @@ def test_a_grasp_beside_a_collision_is_worth_less(bottle):
     ("options", "words"),
     [
         ({"n": 0}, "number of disturbed trials is 0"),
+        ({"n": 10**8}, "give an integer of 1 to 1,000,000"),
         ({"noise": PoseNoise(shift=-1.0)}, "pose noise"),
         ({"disturbed": "table"}, "hand, object"),
         ({"workers": 0}, "workers are 0"),

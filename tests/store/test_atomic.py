@@ -43,6 +43,11 @@ def test_others_may_read_what_is_written(tmp_path):
     assert (tmp_path / "data").read_bytes() == b"\x00\xff"
 
 
+def test_a_folder_that_is_missing_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"make the folder '.*missing' or choose another"):
+        write_file(tmp_path / "missing" / "hand.yaml", "x")
+
+
 def test_a_failed_write_keeps_what_was_there(tmp_path):
     target = tmp_path / "report.html"
     target.mkdir()

@@ -154,7 +154,7 @@ def grasp(
             }
             | losses(problem, candidate.x, input_noise, seed)
             | known_at(problem, found.contacts.points)
-            | (as_measured(problem, candidate) if outcome == "quality" else {})
+            | (as_measured(problem, candidate, input_noise) if outcome == "quality" else {})
             | physics,
             scene=replace(drawn(problem, found), neighbors=neighbors_of(problem, candidate)),
         )
@@ -268,11 +268,11 @@ def known_at(problem: Any, points: Any) -> dict[str, str]:
     return {"shape at the contacts": f"known to {1e3 * deviation:.1f} mm{advice}"}
 
 
-def as_measured(problem: Any, candidate: Any) -> dict[str, str]:
+def as_measured(problem: Any, candidate: Any, noise: Any) -> dict[str, str]:
     """Return what measured thresholds say of a candidate's mean under the input noise, where there are any."""
     from surehold.problems.grasp.measured import threshold_in_words
 
-    words = threshold_in_words(problem, candidate.mean)
+    words = threshold_in_words(problem, candidate.mean, noise)
     return {"held, as measured": words} if words else {}
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["checked", "checker_for", "verdict_in_words"]
+__all__ = ["checked", "checker_for", "squeeze_in_words", "verdict_in_words"]
 
 _MOST = 10_000
 
@@ -47,22 +47,33 @@ def checked(checker: Any, problem: Any, candidate: Any, n: int, console: Any) ->
         grasps = [problem.grasp(x) for x in points]
         held, closed = int(np.sum(checker.held(grasps))), sum(grasp.status == "ok" for grasp in grasps)
         lines["held under noise"] = f"{held} of {len(points)}; in force closure {closed} of {len(points)}"
-    hand = checker.simulator.hand
-    source = hand.sources.get("finger_force", "")
-    lines["squeeze"] = f"{checker.finger_force:g} N a finger{f' ({source})' if source else ''}, {checker.mass:.2g} kg"
+    lines["squeeze"] = squeeze_in_words(checker)
     for name, text in lines.items():
         console.print(f"{candidate.label}: {name}: {text}", markup=False, highlight=False, soft_wrap=True)
     return lines
 
 
+def squeeze_in_words(checker: Any) -> str:
+    """Return the force with which a checker squeezes, where it comes from, and the mass that it shakes."""
+    source = checker.simulator.hand.sources.get("finger_force", "")
+    return f"{checker.finger_force:g} N a finger{f' ({source})' if source else ''}, {checker.mass:.2g} kg"
+
+
 def verdict_in_words(check: Any) -> str:
-    """Return verdict, motions and quality of a check."""
-    worst = max(check.loads, key=lambda load: load.moved)
-    moved = f"moves {1e3 * worst.moved:.1f} mm under {worst.load}" if worst.moved < 1.0 else f"lost under {worst.load}"
+    """Return verdict, motions and quality of a check: the load that is nearest to its limits, or farthest beyond.
+
+    A turn is said where it is nearer to its limit than the way is.
+    """
+    from surehold.grasping.physics.check import HELD, RATED
+    from surehold.grasping.physics.explanation import motion_in_words
+
+    worst = max(check.loads, key=lambda load: max(load.moved / HELD[0], load.turned / HELD[1]))
+    far = motion_in_words(worst.moved, worst.turned, HELD)
+    moved = f"{far} under {worst.load}" if worst.moved < 1.0 else f"lost under {worst.load}"
     lost = [load.load for load in check.loads if load.verdict in ("slipped", "dropped")]
     if len(lost) == len(check.loads):
         moved = "lost under every load"
     if not np.isfinite(check.settled):
         return f"{check.verdict}, {moved}"
-    squeezed = f"the squeeze moves it {1e3 * check.settled:.1f} mm, quality then {check.settled_quality:.3f}"
-    return f"{check.verdict}, {moved}; {squeezed}"
+    squeezed = motion_in_words(check.settled, check.settled_turn, RATED, " it")
+    return f"{check.verdict}, {moved}; the squeeze {squeezed}, quality then {check.settled_quality:.3f}"

@@ -24,6 +24,7 @@ def _grasp_rate(
     file: Annotated[
         Path, typer.Argument(help="A file of grasps: .yaml (Isaac), .json (GraspGen), .npy or a folder of them.")
     ],
+    context: typer.Context,
     obj: Annotated[
         str, typer.Option("--object", help="The object, instead of the one that the file names.", show_default=False)
     ] = "",
@@ -43,7 +44,7 @@ def _grasp_rate(
     from rich.table import Table
 
     from surehold.cli.compilation import announced
-    from surehold.cli.grasp_check import verdict_in_words
+    from surehold.cli.grasp_check import squeeze_in_words, verdict_in_words
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats.gripper import stored_grasp
     from surehold.grasping.formats.writing import checked_formats, write_grasps
@@ -55,7 +56,9 @@ def _grasp_rate(
     if out:
         checked_folder(out)
     console = terminal()
-    content, words, hand, found = described_file(file, {"object": obj, **options})
+    sources = {name: getattr(context.get_parameter_source(name), "name", "") for name in options}
+    given = {name: value for name, value in options.items() if sources[name] == "COMMANDLINE"}
+    content, words, hand, found = described_file(file, {"object": obj, **given})
     body = object_of(words, console) if found is None else found
 
     def build(gripper: Any) -> Any:
@@ -76,7 +79,7 @@ def _grasp_rate(
     columns = ["grasp", "confidence", "before", "status", "quality"]
     for column in columns + (["off: mean", "closed"] if samples else []) + (["physics"] if check else []):
         table.add_column(column, overflow="fold", min_width=len(column))
-    stored = []
+    stored, squeeze = [], ""
     for one in rated:
         before = "" if one.stored.quality is None else f"{one.stored.quality:.3f}"
         row = [escape(one.stored.name), f"{one.stored.confidence:.2f}", before, one.grasp.status]
@@ -86,14 +89,16 @@ def _grasp_rate(
         if check:
             from surehold.grasping.physics.check import GraspChecker
 
-            row.append(verdict_in_words(GraspChecker(one.simulator).check(one.grasp)))
+            checker = GraspChecker(one.simulator)
+            squeeze = f"; squeezed with {squeeze_in_words(checker)}"
+            row.append(verdict_in_words(checker.check(one.grasp)))
         table.add_row(*row)
         preshape = one.simulator.hand.preshapes[one.simulator.preshape]
         worth = one.grasp.quality if one.robust is None else one.robust.mean
         stored.append(stored_grasp(hand, one.grasp, preshape, one.stored.name, worth))
     console.print(
         f"{file}: {len(rated)} grasps of hand {hand.name} on {body.name}, {simulator.quality} with "
-        f"{simulator.contact} contacts and friction {simulator.friction:g}.",
+        f"{simulator.contact} contacts and friction {simulator.friction:g}{squeeze}.",
         markup=False,
         soft_wrap=True,
     )

@@ -1,6 +1,7 @@
 """`surehold hand new`: the description of a hand that nobody has described, from its model."""
 
 import os
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -47,4 +48,5 @@ def new(
         soft_wrap=True,
     )
     shown_hand(hand, "", open_page, console)
-    console.print(f"Description: {file}. Grasp with it: surehold grasp mug --hand {file}", markup=False, soft_wrap=True)
+    grasp = f"surehold grasp mug --hand {shlex.quote(str(file))}"
+    console.print(f"Description: {file}. Grasp with it: {grasp}", markup=False, soft_wrap=True)

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 DISTURBED: Final = ("hand", "object")
 _TRUNCATION = 3.0  # standard deviations
+_MOST: Final = 1_000_000  # trials: hours
 
 
 class PoseNoise(NamedTuple):
@@ -84,7 +85,8 @@ def robust_quality(
     Raises
     ------
     InputError
-        If n is not a positive integer, a bound is negative or not finite, a name is unknown, or the pose is not finite.
+        If n is not an integer of 1 to 1,000,000, a bound is negative or not finite, a name is unknown, or the pose is
+        not finite.
     """
     poses = disturbed_poses(simulator, pose, noise, n, seed, disturbed)
     batch = grasp_batch(simulator, poses, np.tile(s1, (len(poses), 1)) if isinstance(s1, tuple) else s1, workers)
@@ -118,8 +120,8 @@ def disturbed_poses(
     """
     from scipy.special import ndtr, ndtri
 
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
-        raise InputError(f"number of disturbed trials is {n!r}; give an integer of 1 or more.")
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= _MOST:
+        raise InputError(f"number of disturbed trials is {n!r}; give an integer of 1 to {_MOST:,}.")
     if disturbed not in DISTURBED:
         raise unknown_name("disturbed body", disturbed, DISTURBED)
     bounds = noise or PoseNoise()

@@ -51,19 +51,19 @@ def rated_grasps(
     Raises
     ------
     InputError
-        If the joints of a grasp are not those of the hand; the message names the grasp.
+        If joints or posture of a grasp are not those of the hand; the message names the grasp.
     """
     for stored in file.grasps:
         chosen = simulator
-        if stored.joints:
-            try:
+        pose = simulator.object_pose @ palm_pose(simulator.hand, file, stored)
+        try:
+            if stored.joints:
                 check_joints(simulator.hand, stored.joints)
                 if stored.quality is None:
                     chosen = build(closing_hand(simulator.hand, stored.pregrasp_joints, stored.joints))
-            except InputError as error:
-                raise InputError(f"grasp {stored.name!r}: {error}") from None
-        pose = simulator.object_pose @ palm_pose(simulator.hand, file, stored)
-        s1 = stored.posture if chosen is simulator else 0.0
-        grasp = chosen.grasp(pose, s1)
+            s1 = stored.posture if chosen is simulator else 0.0
+            grasp = chosen.grasp(pose, s1)
+        except InputError as error:
+            raise InputError(f"grasp {stored.name!r}: {error}") from None
         robust = robust_quality(chosen, pose, s1, n=samples, seed=seed) if samples else None
         yield RatedGrasp(stored, grasp, chosen, robust)

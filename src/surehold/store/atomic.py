@@ -44,9 +44,9 @@ def write_file(path: Path, content: str | bytes) -> None:
         with replacing(path) as file:
             file.write(content.encode("utf-8") if isinstance(content, str) else content)
     except OSError as error:
-        raise InputError(
-            f"file '{path}' cannot be written ({error.strerror or error}); free the place or choose another."
-        ) from None
+        there = path.parent.is_dir()
+        advice = "free the place or choose another" if there else f"make the folder '{path.parent}' or choose another"
+        raise InputError(f"file '{path}' cannot be written ({error.strerror or error}); {advice}.") from None
 
 
 def checked_folder(folder: str | Path) -> Path:

@@ -305,6 +305,14 @@ def test_bodies_are_turned_united_and_counted_once(tmp_path, placed, grams, cent
     assert 1e6 * sum(hulls) == pytest.approx(grams, rel=0.01), "the check by physics has the same solid"
 
 
+def test_bodies_apart_are_said_to_be_taken_as_one(tmp_path):
+    loaded = load_mesh(stored(tmp_path, boxes((0, 0, 60, False), (80, 0, 40, False), (60, 0, 60, False))), "mm")
+    assert "rigid" not in loaded.diagnosis, "the one between joins them"
+    loaded = load_mesh(stored(tmp_path, boxes((0, 0, 60, False), (80, 0, 40, False), (0, 0, 30, True))), "mm")
+    assert loaded.diagnosis.endswith("2 bodies that do not touch are taken as one rigid object")
+    assert loaded.object.mass == pytest.approx(0.216 + 0.064 - 0.027)
+
+
 def test_inside_is_inside_of_a_body_that_was_turned(tmp_path):
     part = load_mesh(stored(tmp_path, boxes((0, 0, 60, True), (80, 0, 40, False))), "mm", frame="file").object
     found = Simulator(obj=part).field.distance(np.array([[-0.029, 0.0, 0.0], [0.080, 0.0, 0.019], [0.045, 0.0, 0.0]]))

@@ -143,6 +143,7 @@ def _filled(vertices: Array, faces: Faces, holes: _Holes) -> tuple[Array, Faces]
 
 def _one_solid(vertices: Array, faces: Faces, notes: list[str]) -> tuple[Array, Faces]:
     """Return the mesh with its bodies turned to the outside and, where they touch or overlap, united."""
+    from scipy.sparse.csgraph import connected_components
     from trimesh.triangles import mass_properties
 
     bodies = _bodies(faces)
@@ -174,6 +175,9 @@ def _one_solid(vertices: Array, faces: Faces, notes: list[str]) -> tuple[Array, 
         )
     near = np.all(boxes[:, None, 0] <= boxes[None, :, 1] + 1e-8, axis=2)
     near &= near.T & outward[:, None] & outward[None, :] & ~np.eye(len(bodies), dtype=bool)
+    apart = connected_components(near[np.ix_(outward, outward)], directed=False)[0]
+    if apart > 1:
+        notes.append(f"{apart} bodies that do not touch are taken as one rigid object")
     if not np.any(near) or any(solid is None for solid in solids):
         return vertices, faces
     return _united(solids, outward, vertices, faces, notes)

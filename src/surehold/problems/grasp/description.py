@@ -1,5 +1,6 @@
 """From a grasp in words, as a command line, a stored study or a plan says it, to the problem."""
 
+import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -93,7 +94,7 @@ def described_hand(name: str, config: str, preshape: str = "") -> Hand:
     if not config:
         raise InputError(
             f"hand {name} is a model file; describe its palm and fingers with hand-config: a YAML file, such as "
-            f"`surehold hand new {name}` writes."
+            f"`surehold hand new {shlex.quote(name)}` writes."
         )
     from surehold.grasping.hand.files import load_hand
 

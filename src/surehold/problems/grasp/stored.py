@@ -37,20 +37,20 @@ def stored_words(words: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a file of grasps keeps of a `DescribedGrasp`: what has its default is left out."""
     given = checked_words(words) | (THESIS_SIMULATOR if words.get("preset") else {})
     kept = {name: given[name] for name in _KEPT if given[name] != OPTIONS[name].default}
-    if given["cloud"]:  # the file has its mean shape beside it
-        return {name: value for name, value in kept.items() if name not in _OBJECT}
+    if given["cloud"]:  # the file has its mean shape beside it, in meters
+        return {name: value for name, value in kept.items() if name not in ("object", "unit", "frame")}
     return {"object": given["object"]} | kept
 
 
 def described_file(path: str | Path, words: Mapping[str, Any]) -> DescribedFile:
-    """Read a file of grasps; `words`, where they are not the default, stand above what the file says.
+    """Read a file of grasps; `words`, those that are given, stand above what the file says.
 
     Raises
     ------
     InputError
         If the file, the hand or the object is refused or not named, or an option of the file does not exist.
     """
-    given = {name: value for name, value in words.items() if value not in ("", OPTIONS[name].default)}
+    given = {name: value for name, value in words.items() if value not in ("", None)}
     file = read_isaac_grasps(path) if format_of(path) == "isaac" else None
     said = dict(file.settings) if file else {}
     for name in said:
@@ -60,13 +60,13 @@ def described_file(path: str | Path, words: Mapping[str, Any]) -> DescribedFile:
         said = {name: value for name, value in said.items() if name not in _OBJECT}
     merged = checked_words({"object": ""} | said | given)
     _check_kinds(str(path), merged)
-    hand = described_hand(merged["hand"], merged["hand_config"], merged["preshape"] or "")
+    hand = _hand(str(path), merged, "hand" in given)
     if file is None:
         file = read_grasps(path, joint_order(hand))
     name = merged["object"]
     if name and (name in OBJECTS or Path(name).exists() or "object" in given):
         return DescribedFile(file, merged, hand, None)
-    return DescribedFile(file, merged, hand, _beside(Path(path), file, merged["mass"]))
+    return DescribedFile(file, merged, hand, _beside(Path(path), file, merged["mass"], merged["frame"]))
 
 
 def described_simulator(words: Mapping[str, Any], obj: GraspObject, hand: Hand) -> Simulator:
@@ -82,7 +82,19 @@ def described_simulator(words: Mapping[str, Any], obj: GraspObject, hand: Hand) 
     return Simulator(hand, obj, preshape=preshape, **settings)
 
 
-def _beside(path: Path, file: GraspFile, mass: float | None) -> GraspObject:
+def _hand(path: str, words: Mapping[str, Any], given: bool) -> Hand:
+    """Return the hand of a description; the message about one that only the file names says so."""
+    try:
+        return described_hand(words["hand"], words["hand_config"], words["preshape"] or "")
+    except InputError as error:
+        if given:
+            raise
+        raise InputError(
+            f"{path!r} was made with hand {words['hand']!r}: {error} Give --hand, or --preshape, as it is here."
+        ) from None
+
+
+def _beside(path: Path, file: GraspFile, mass: float | None, frame: str | None) -> GraspObject:
     """Return the object whose mesh lies in the folder of the file, or in the one above or beside it."""
     from surehold.grasping.object.mesh_files import load_mesh
 
@@ -98,7 +110,7 @@ def _beside(path: Path, file: GraspFile, mass: float | None) -> GraspObject:
             f"{str(path)!r} names the object {file.object_file[:80]!r}, which is not beside it; give it with --object "
             "and, for a mesh file, --unit."
         )
-    return load_mesh(mesh, "m", mass, scale=file.object_scale).object
+    return load_mesh(mesh, "m", mass, frame or "auto", scale=file.object_scale).object
 
 
 def _check_kinds(path: str, words: Mapping[str, Any]) -> None:
