@@ -41,7 +41,7 @@ def postgresql_server():
     data = folder / "data"
     made = subprocess.run(
         [*user, initdb, "-D", data, "-A", "trust", "-U", "surehold", "--no-sync", "-E", "UTF8", "--locale=C"],
-        capture_output=True, text=True, cwd=folder, timeout=120,
+        capture_output=True, text=True, cwd=folder, timeout=600,
     )  # fmt: skip
     if made.returncode:
         shutil.rmtree(folder, ignore_errors=True)
@@ -61,7 +61,7 @@ def postgresql_server():
         yield url
     finally:
         server.terminate()
-        server.wait(timeout=30)
+        server.wait(timeout=600)
         shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -20,7 +20,7 @@ sh.Box({"a": (0.0, 1.0)}).dimension.upper()
 def _complaints(path):
     """Return line and rule of what pyright says of a file that stands outside the project."""
     command = [sys.executable, "-m", "pyright", "--outputjson", "--pythonpath", sys.executable, str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=path.parent, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=path.parent, timeout=600)
     said = json.loads(done.stdout)
     assert said["summary"]["filesAnalyzed"] == 1, done.stdout
     return [(d["range"]["start"]["line"], d.get("rule")) for d in said["generalDiagnostics"]]

@@ -60,7 +60,7 @@ def test_the_page_opens_in_a_browser(page):
     if browser is None:
         pytest.skip("no chromium here")
     command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", "--virtual-time-budget=8000"]
-    told = subprocess.run([*command, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
+    told = subprocess.run([*command, page.as_uri()], capture_output=True, text=True, timeout=600, check=True)
     assert 'id="scene-chooser"' in told.stdout  # eight grasps to choose from
     assert told.stdout.count("<svg") >= 10
     assert "<canvas" in told.stdout or "shows no 3-D graphics" in told.stdout

@@ -114,7 +114,9 @@ def test_a_full_disk_keeps_the_rows_before(tmp_path):
         "                          settings={}, best=[[0, 1.0]] * 20))\n"
     )
     here = __file__.rpartition("/")[0]
-    told = subprocess.run([sys.executable, "-c", code, str(tmp_path), here], capture_output=True, text=True, timeout=60)
+    told = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path), here], capture_output=True, text=True, timeout=600
+    )
     assert "SureholdError" in told.stderr
     assert "cannot be written" in told.stderr
     assert "Free space and start again" in " ".join(told.stderr.split())

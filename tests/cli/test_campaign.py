@@ -130,7 +130,7 @@ def test_ctrl_c_keeps_what_is_finished(here, workers):
     while time.monotonic() < deadline and not (table.exists() and table.read_bytes().count(b"\n") > 4):
         time.sleep(0.05)
     os.kill(told.pid, signal.SIGINT)
-    out, _ = told.communicate(timeout=100)
+    out, _ = told.communicate(timeout=600)
     assert told.returncode == 130
     assert "The same command continues" in " ".join(out.split())
     rows = table.read_text().splitlines()

@@ -163,7 +163,7 @@ def test_a_worker_that_is_ended_lets_its_trial_go(ending, study, here):
         time.sleep(0.1)
     time.sleep(0.3)
     worker.send_signal(ending)
-    out, err = worker.communicate(timeout=60)
+    out, err = worker.communicate(timeout=600)
     assert (worker.returncode, err) == (130, "")
     assert "the one under way is let go" in out
     assert study("status slow")["pending"][0]["worker_alive"] is False
@@ -280,7 +280,7 @@ def test_a_process_of_its_own(here):
     """As another language would call it."""
     command = [sys.executable, "-m", "surehold", "study"]
     for line in (CREATE, "ask mug --json"):
-        done = subprocess.run([*command, *line.split()], capture_output=True, text=True, timeout=120)
+        done = subprocess.run([*command, *line.split()], capture_output=True, text=True, timeout=600)
         assert done.returncode == 0, done.stderr
         assert done.stderr == ""
     assert json.loads(done.stdout)["id"] == 0

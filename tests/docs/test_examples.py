@@ -141,7 +141,7 @@ def test_the_commands_for_postgresql(postgresql_server, tmp_path):
         )
 
     def told(process):
-        output, _ = process.communicate(timeout=300)
+        output, _ = process.communicate(timeout=600)
         assert process.returncode == 0, process.args
         return output
 

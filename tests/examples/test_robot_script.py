@@ -27,10 +27,10 @@ def test_a_robot_in_bash_finds_the_place(tmp_path, monkeypatch, capfd):
         try:
             address = served.stdout.readline().split(" at ")[1].split("/ ")[0]
             robot = subprocess.run(
-                ["bash", SCRIPT, f"{address}/studies/arm", "22"], capture_output=True, text=True, timeout=300
+                ["bash", SCRIPT, f"{address}/studies/arm", "22"], capture_output=True, text=True, timeout=600
             )
             refused = subprocess.run(
-                ["bash", SCRIPT, f"{address}/studies/leg", "1"], capture_output=True, text=True, timeout=300
+                ["bash", SCRIPT, f"{address}/studies/leg", "1"], capture_output=True, text=True, timeout=600
             )
         finally:
             served.terminate()

@@ -133,7 +133,7 @@ def in_a_browser(page, folder):
         ["chromium", *flags, "--virtual-time-budget=3000", "--dump-dom", f"file://{folder / 'page.html'}"],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=True,
     ).stdout
 

@@ -36,7 +36,7 @@ def _run(folder, before="", **environment):
     here = {key: value for key, value in os.environ.items() if key != "SUREHOLD_WARM_UP"} | environment
     code = PARENT.format(folder=str(folder), child=CHILD.format(folder=str(folder)), before=before)
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], env=here, capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, "-W", "error", "-c", code], env=here, capture_output=True, text=True, check=False, timeout=600
     )
     assert done.stderr == "", done.stderr
     return done.stdout.splitlines()

@@ -48,7 +48,7 @@ def _answer(place, before=""):
         f"import sys\nsys.path.insert(0, {str(place / 'module')!r})\n{before}\nimport kernels\nprint(kernels.more(3.0))"
     )
     done = subprocess.run(
-        [sys.executable, "-B", "-c", code], env=environment, capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, "-B", "-c", code], env=environment, capture_output=True, text=True, check=False, timeout=600
     )
     assert done.stdout == "8.0\n", done.stderr
     return done.stderr

@@ -305,7 +305,7 @@ def test_processes_get_different_trials(tmp_path):
     runs = [
         subprocess.Popen([sys.executable, "-c", PROCESS, robot.storage.url], stdout=subprocess.PIPE) for _ in range(3)
     ]
-    ids = [i for run in runs for i in json.loads(run.communicate(timeout=120)[0])]
+    ids = [i for run in runs for i in json.loads(run.communicate(timeout=600)[0])]
     assert sorted(ids) == list(range(18))
     trials = again(robot).trials()
     assert len({tuple(t.params.values()) for t in trials}) == 18

@@ -35,7 +35,7 @@ def serve(url, port=0):
 
 def stop(process):
     process.terminate()
-    process.communicate(timeout=30)
+    process.communicate(timeout=600)
 
 
 def test_exploring_survives_the_robot_and_the_service(tmp_path, modules):

@@ -121,7 +121,7 @@ def test_workers_wait_while_the_study_is_paused(study):
     time.sleep(0.3)
     assert study.trials() == []
     study.resume()
-    thread.join(timeout=20.0)
+    thread.join(timeout=600)
     assert len(study.trials()) == 1
 
 
