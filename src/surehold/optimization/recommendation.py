@@ -19,9 +19,19 @@ from surehold.optimization.box import Box
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.surrogates.protocol import Posterior
 
-__all__ = ["Outcome", "Recommendation", "execution_at", "expectation_at", "outliers_in_words", "recommendation"]
+__all__ = [
+    "OUTSIDE",
+    "Outcome",
+    "Recommendation",
+    "execution_at",
+    "expectation_at",
+    "outliers_in_words",
+    "recommendation",
+]
 
 _LEVEL: Final = 0.05
+#: Why a trial that reached such a place is no answer.
+OUTSIDE: Final = "reached a place outside of the box."
 
 
 @dataclass(frozen=True)
@@ -196,7 +206,7 @@ def recommendation(
     noise_variance: float | None = None,
     warning: str = "",
 ) -> Recommendation:
-    """Describe u (d,) of the unit cube; `highest` is the best observed trial and its value.
+    """Describe u (d,) of the unit cube; `highest` is where the best observed trial was, and its value.
 
     `sign` is that of the values in which the answer is given: -1 where what was told has been turned over.
     """
@@ -208,9 +218,11 @@ def recommendation(
     unit = float(np.abs(spread).max()) or 1.0  # squares may overflow
     variance = weights @ (spread / unit) ** 2
     refused = ""
-    if np.any(np.abs(highest[0] - u) > 1e-6):
+    best, worse = ("highest", "less") if sign > 0.0 else ("lowest", "more")
+    if np.any(np.abs(highest[0] - 0.5) > 0.5):
+        refused = f"The {best} observed trial gave {sign * highest[1]:.4g}, but {OUTSIDE}"
+    elif np.any(np.abs(highest[0] - u) > 1e-6):
         other = execution_at(posterior, reached, highest[0], noise_variance)
-        best, worse = ("highest", "less") if sign > 0.0 else ("lowest", "more")
         refused = (
             f"The {best} observed trial gave {sign * highest[1]:.4g}, but under the noise {sign * other.mean:.4g} is "
             f"expected, and {worse} than {sign * other.quantile(_LEVEL):.4g} once in twenty executions; of the "

@@ -33,6 +33,9 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
         words.append(("success", "1 where a trial succeeded, 0 where it did not; the share of several executions."))
     else:
         words.append(("hit exactly", "The value of the trial itself, which reached its input."))
+    if report.extreme.endswith("feasible"):
+        meaning = "Fit to be the answer: allowed, inside of the box, within all limits, and not prone to fail."
+        words.append(("feasible", meaning))
     if report.noise is not None:
         words += [
             (

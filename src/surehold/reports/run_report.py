@@ -162,6 +162,13 @@ class Surface:
     note: str = ""  #: such as "slice through the recommended point"
 
 
+def extreme_of(y: Floats, best: float, minimized: bool) -> str:
+    """Return what the best of the values (n,) that may be the answer is: "highest" or "lowest", or that "feasible"."""
+    told = y[np.isfinite(y)]
+    beaten = bool(np.any(told < best if minimized else told > best))
+    return ("lowest" if minimized else "highest") + " feasible" * beaten
+
+
 @dataclass(frozen=True)
 class RunReport:
     """One finished or interrupted run."""
@@ -243,8 +250,8 @@ class RunReport:
 
     @property
     def extreme(self) -> str:
-        """What the best value observed is: "highest" or "lowest"."""
-        return "lowest" if self.minimized else "highest"
+        """What the best value observed is, see `extreme_of`."""
+        return extreme_of(self.y, self.best_trace[-1] if self.y.size else np.nan, self.minimized)
 
     @property
     def recommended(self) -> Candidate:

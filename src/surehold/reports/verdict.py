@@ -55,7 +55,7 @@ def verdict(report: RunReport) -> Verdict:
 
 def _of_the_run(report: RunReport) -> Verdict:
     highest, answer = report.observed, report.recommended
-    extreme, peak = report.extreme, "lowest dip" if report.minimized else "highest peak"
+    extreme, peak = report.extreme, f"{report.extreme} {'dip' if report.minimized else 'peak'}"
     falls = "rises" if report.minimized else "falls"
     name, off = report.quality_name, report.disturbance
     told = report.y[~report.failed]
@@ -80,7 +80,7 @@ def _of_the_run(report: RunReport) -> Verdict:
                 f"No re-queries with perturbed inputs were made, so nothing is said here about what happens when {off}."
             )
         return Verdict(
-            f"The best {name} found is {number(highest.quality)}.",
+            f"The best{' feasible' * extreme.endswith('feasible')} {name} found is {number(highest.quality)}.",
             f"It was met at {coordinates(report, highest)} ({_trial(highest)} of {report.y.size}). {why}",
             False,
         )
@@ -210,7 +210,7 @@ def _tail(report: RunReport) -> int:
 def _of_the_model(report: RunReport) -> Verdict:
     """Return the verdict where nothing was queried again: what the model expects."""
     highest, answer, off = report.observed, report.recommended, report.disturbance
-    peak = "lowest dip" if report.minimized else "highest peak"
+    peak = f"{report.extreme} {'dip' if report.minimized else 'peak'}"
     expected = number(answer.predicted_mean)
     text = f"No re-queries with perturbed inputs were made: what happens when {off} is what the model expects."
     if len(report.candidates) == 1:

@@ -118,12 +118,13 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     history = sampler.history(trials, space)
     with sampler.optimizing(space, history, direction) as optimizer:
         best, success = optimizer.recommend(), optimizer.outcome == "success"
-        told = np.flatnonzero(np.isfinite(history.y))
+        y = optimizer.y  # where trials succeed or fail, a failed one is one that did not succeed
+        told = np.flatnonzero(np.isfinite(y))
         distance = np.abs(optimizer.box.to_unit(history.reached[told]) - optimizer.box.to_unit(best.x)).max(axis=1)
         # what was reached outside of the ranges cannot be commanded: the nearest place that can is the answer
         inside = [optimizer.box.contains(place) for place in history.reached]
     same = told[distance <= distance.min() + 1e-9]
-    row, best_row = int(same[np.argmax(sign * history.y[same])]), int(np.nanargmax(sign * history.y))
+    row, best_row = int(same[np.argmax(sign * y[same])]), int(np.nanargmax(sign * y))
     number, best_number = int(history.numbers[row]), int(history.numbers[best_row])
     trial = next(t for t in trials if t.number == number)
     return StudyRecommendation(
@@ -132,9 +133,9 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         best.mean,
         best.std,
         best.quantile,
-        float(history.y[row]),
+        float(y[row]),
         best_number,
-        float(history.y[best_row]),
+        float(y[best_row]),
         best.n,
         best.refused if number != best_number else "",
         tuple(int(history.numbers[i]) for i in best.outliers),

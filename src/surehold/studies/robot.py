@@ -226,7 +226,10 @@ class RobotStudy:
             return self._suggested(trials)
 
     def promise(self) -> float | None:
-        """Return the improvement that a further trial is expected to bring; None during the initial design."""
+        """Return the improvement that a further trial is expected to bring.
+
+        None during the initial design, and while no trial may become the answer.
+        """
         with self.storage.failures():
             return self._promise(self._ledger.trials())
 
@@ -413,7 +416,8 @@ class RobotStudy:
         if len(trials) < self.n_initial or not np.isfinite(history.y).any():
             return None
         with self.sampler.optimizing(self.settings.space, history, self.settings.direction) as optimizer:
-            return optimizer.promise()
+            promise = optimizer.promise()
+            return promise if np.isfinite(promise) else None
 
     def _asked(self, trial: FrozenTrial, again: bool) -> Asked:
         parameters = {name: trial.params[name] for name in self.settings.space.distributions}
