@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 import surehold as sh
+from surehold.optimization.recommendation import in_digits
 
 LINE = sh.Box({"x": (-1.0, 1.0)})
 
@@ -68,3 +69,19 @@ def test_the_best_value_told_from_outside_of_the_box_is_named_and_refused(direct
     assert best.x[0] == pytest.approx(0.5)
     assert best.refused == f"The {extreme} observed trial gave {sign * 1.2:g}, but reached a place outside of the box."
     assert optimizer.feasible.tolist() == [True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("value", "deviation", "text"),
+    [
+        (293.1532, 0.05, "293.153"),
+        (1e6 + 0.0026, 0.014, "1000000.003"),
+        (0.123456, 0.05, "0.1235"),
+        (-5.0, 0.0, "-5"),
+        (1e300, 1e-300, "1e+300"),
+        (np.nan, 1.0, "nan"),
+        (1.0, np.inf, "1"),
+    ],
+)
+def test_a_value_is_said_to_a_tenth_of_its_deviation(value, deviation, text):
+    assert in_digits(value, deviation) == text

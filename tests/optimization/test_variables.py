@@ -195,3 +195,11 @@ def test_half_a_character_is_refused():
     for bounds in ({"\ud800": (0.0, 1.0)}, {"grip": ["pinch", "\udfff"]}):
         with pytest.raises(InputError, match="half a character"):
             Box(bounds)
+
+
+def test_a_number_names_the_choice_that_is_written_like_it():
+    """JSON and tables turn the choice "7" of a command line into the number 7."""
+    box = Box({"grip": ["a", "7", "True"]})
+    assert [box.as_dict(box.points({"grip": given}))["grip"] for given in (7, np.int64(7), True)] == ["7", "7", "True"]
+    with pytest.raises(InputError, match="choice for 'grip' '8' is unknown"):
+        box.points({"grip": 8})

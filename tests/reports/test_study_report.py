@@ -13,7 +13,7 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 import surehold as sh
 from surehold.errors import InputError
 from surehold.reports.interactive import interactive_plots
-from surehold.reports.page import render
+from surehold.reports.page import render, table_rows
 from surehold.reports.study_report import study_report
 from surehold.studies.dashboard import Dashboard
 from surehold.studies.replay import result_of
@@ -87,6 +87,9 @@ def test_all_kinds_of_parameters_are_drawn(tmp_path):
         study.tell(asked.id, asked.parameters["n"] - asked.parameters["f"])
     report = study_report(study)
     assert [v.label for v in report.variables] == ["f [log N]", "n"]
+    answer = study.recommend().parameters
+    rows = dict(table_rows(report))
+    assert float(rows["f [N]"][0]) == pytest.approx(answer["f"], rel=1e-3), "the value, not its logarithm"
     taken = [trial.params["c"] for trial in study.trials()]
     assert report.choices == {"c": tuple(taken)}
     assert f", c = {taken[report.recommended.trial]}" in render(report)

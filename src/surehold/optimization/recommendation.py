@@ -7,6 +7,7 @@ Two distributions, both mixtures of normals:
                   noise; what is left of its spread is what the model does not know
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -25,6 +26,7 @@ __all__ = [
     "Recommendation",
     "execution_at",
     "expectation_at",
+    "in_digits",
     "outliers_in_words",
     "recommendation",
 ]
@@ -169,6 +171,13 @@ def outliers_in_words(numbers: Sequence[int]) -> str:
     )
 
 
+def in_digits(value: float, deviation: float) -> str:
+    """Return a value in four digits, or, where it is far from 0, in as many as show a tenth of the deviation."""
+    known = value and math.isfinite(value) and 0.0 < deviation < math.inf
+    apart = math.log10(abs(value)) - math.log10(deviation) if known else 0.0
+    return f"{value:.{min(max(4, math.ceil(apart) + 2), 15)}g}"
+
+
 def execution_at(
     posterior: Posterior, reached: Perturbations, u: NDArray[np.float64], noise_variance: float | None = None
 ) -> Outcome:
@@ -218,16 +227,20 @@ def recommendation(
     unit = float(np.abs(spread).max()) or 1.0  # squares may overflow
     variance = weights @ (spread / unit) ** 2
     refused = ""
+
+    def said(value: float) -> str:
+        return in_digits(sign * value, outcome.std)
+
     best, worse = ("highest", "less") if sign > 0.0 else ("lowest", "more")
     if np.any(np.abs(highest[0] - 0.5) > 0.5):
-        refused = f"The {best} observed trial gave {sign * highest[1]:.4g}, but {OUTSIDE}"
+        refused = f"The {best} observed trial gave {said(highest[1])}, but {OUTSIDE}"
     elif np.any(np.abs(highest[0] - u) > 1e-6):
         other = execution_at(posterior, reached, highest[0], noise_variance)
         refused = (
-            f"The {best} observed trial gave {sign * highest[1]:.4g}, but under the noise {sign * other.mean:.4g} is "
-            f"expected, and {worse} than {sign * other.quantile(_LEVEL):.4g} once in twenty executions; of the "
-            f"recommended one {sign * outcome.mean:.4g} is expected, and {worse} than "
-            f"{sign * outcome.quantile(_LEVEL):.4g} once in twenty."
+            f"The {best} observed trial gave {said(highest[1])}, but under the noise {said(other.mean)} is "
+            f"expected, and {worse} than {said(other.quantile(_LEVEL))} once in twenty executions; of the "
+            f"recommended one {said(outcome.mean)} is expected, and {worse} than "
+            f"{said(outcome.quantile(_LEVEL))} once in twenty."
         )
     x = box.from_unit(u)
     return Recommendation(

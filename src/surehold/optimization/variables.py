@@ -122,8 +122,8 @@ class Choice(NamedTuple):
             if choice is value or (value == choice and isinstance(value, bool) == isinstance(choice, bool)):
                 return i
         texts = [str(choice) for choice in self.choices]
-        if isinstance(value, str) and value in texts:
-            return texts.index(value)
+        if isinstance(value, (str, int, float, np.generic)) and str(value) in texts:
+            return texts.index(str(value))
         raise unknown_name(f"choice for '{self.name}'", value, texts)
 
     def checked(self, value: Any, what: str) -> Any:

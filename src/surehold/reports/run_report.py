@@ -3,6 +3,7 @@
 Letters: n trials, d variables, q perturbed re-queries of a candidate, c contacts.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -50,6 +51,27 @@ class Variable:
     def label(self) -> str:
         """Name and shown unit, as on an axis."""
         return f"{self.name} [{self.shown_unit}]" if self.shown_unit else self.name
+
+    @property
+    def log(self) -> bool:
+        """Whether values are natural logarithms: figures show them as they are, tables and text what they stand for."""
+        return self.unit.split(" ")[0] == "log"
+
+    @property
+    def table_unit(self) -> str:
+        """The unit in tables and text."""
+        return self.shown_unit[3:].strip() if self.log else self.shown_unit
+
+    @property
+    def more_digits(self) -> int:
+        """By how many digits values need more than usual, see `_more_digits`."""
+        return 0 if self.log else _more_digits(self.lower, self.upper)
+
+
+def _more_digits(low: float, high: float) -> int:
+    """Return how many more digits tell numbers from low to high apart: 2 of 1013.1 and 1014.6, 0 of 0.1 and 0.6."""
+    size, width = max(abs(low), abs(high)), high - low
+    return min(max(math.floor(math.log10(size)) - math.floor(math.log10(width)) - 1, 0), 12) if width > 0.0 else 0
 
 
 @dataclass(frozen=True)
@@ -242,6 +264,12 @@ class RunReport:
     def lost(self) -> NDArray[np.bool_]:
         """Which trials gave no value, or of whose executions less than half succeeded, (n,)."""
         return self.failed | (self.counted & (self.y < 0.5))
+
+    @property
+    def more_digits(self) -> int:
+        """By how many digits values need more than usual to be told apart: where all are far from 0."""
+        told = self.y[~self.failed]
+        return _more_digits(float(told.min()), float(told.max())) if told.size else 0
 
     @property
     def observed(self) -> Candidate:

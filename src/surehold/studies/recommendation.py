@@ -11,7 +11,7 @@ import numpy as np
 from optuna.study import Study
 
 from surehold.errors import InputError
-from surehold.optimization.recommendation import outliers_in_words
+from surehold.optimization.recommendation import in_digits, outliers_in_words
 from surehold.studies.dashboard_note import read_note, write_note
 from surehold.studies.history import REACHED
 from surehold.studies.sampler import Sampler, direction_of
@@ -68,7 +68,8 @@ class StudyRecommendation:
                 f"{probability:.0%} sure of at least {float(s):.0%}" for s, probability in self.sure.items()
             )
             return f"{self.mean:.1%} of executions succeed; 95% sure of at least {self.quantile:.1%}, {more}"
-        return f"{self.mean:.4g} ± {self.std:.2g}, 95 % better than {self.quantile:.4g}"
+        mean, quantile = in_digits(self.mean, self.std), in_digits(self.quantile, self.std)
+        return f"{mean} ± {self.std:.2g}, 95 % better than {quantile}"
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -156,7 +157,7 @@ def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> 
         "| --- | --- |",
         *(f"| {key} | {_shown(value)} {units.get(key, '')} |" for key, value in found.parameters.items()),
         "",
-        f"Expected when the input is off: {found.expected}. It gave {found.observed:.4g} when it was tried. {found.n} "
+        f"Expected: {found.expected}. It gave {in_digits(found.observed, found.std)} when it was tried. {found.n} "
         "trials with a value.",
     ]
     if found.outputs:
