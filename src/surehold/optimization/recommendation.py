@@ -142,7 +142,8 @@ class Recommendation:
 
     def __repr__(self) -> str:
         x = np.array2string(self.x, precision=6, separator=", ")
-        return f"Recommendation(x={x}, mean={self.mean:.6g}, std={self.std:.3g}, quantile={self.quantile:.6g})"
+        mean, quantile = (in_digits(value, self.std, 6) for value in (self.mean, self.quantile))
+        return f"Recommendation(x={x}, mean={mean}, std={self.std:.3g}, quantile={quantile})"
 
     def probability_below(self, value: float) -> float:
         """Return the probability that the next execution gives less than `value`."""
@@ -171,11 +172,11 @@ def outliers_in_words(numbers: Sequence[int]) -> str:
     )
 
 
-def in_digits(value: float, deviation: float) -> str:
-    """Return a value in four digits, or, where it is far from 0, in as many as show a tenth of the deviation."""
+def in_digits(value: float, deviation: float, least: int = 4) -> str:
+    """Return a value in `least` digits, or, where it is far from 0, in as many as show a tenth of the deviation."""
     known = value and math.isfinite(value) and 0.0 < deviation < math.inf
     apart = math.log10(abs(value)) - math.log10(deviation) if known else 0.0
-    return f"{value:.{min(max(4, math.ceil(apart) + 2), 15)}g}"
+    return f"{value:.{min(max(least, math.ceil(apart) + 2), 15)}g}"
 
 
 def execution_at(

@@ -25,13 +25,16 @@ class Verdict:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a value as people write it: `digits` significant digits, no exponent between 0.0001 and 100,000."""
+    """Return a value as people write it: `digits` significant digits, no exponent between 0.0001 and 100,000.
+
+    Nor beyond, where so many digits reach behind the point.
+    """
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0.0:
         return "0"
     size = math.floor(math.log10(abs(value)))
-    if size < -4 or size >= 5:
+    if size < -4 or size >= max(5, digits):
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return f"{mantissa}e{int(exponent)}".replace("-", "−")
     return f"{value:.{max(digits - 1 - size, 0)}f}".replace("-", "−")
