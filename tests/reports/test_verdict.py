@@ -210,8 +210,8 @@ def test_values_far_from_zero_are_shown_with_the_digits_that_tell_them_apart():
         shaken("recommended", 1014.0, 1013.9 + 0 * SPREAD),
     )
     told = verdict(report(*sides, **run))
-    assert "The highest peak (1014.6) was refused" in told.headline
-    assert "it is worth only 1013.2, the recommended point 1013.9" in told.headline
+    assert "The highest peak (1014.60) was refused" in told.headline
+    assert "it is worth only 1013.20, the recommended point 1013.90" in told.headline
     assert report(*sides).more_digits == 0
     near = replace(sides[1], x=np.array([1000.123, 0.0]))
     two = {"variables": (Variable("k", 1000.0, 1000.5), Variable("f", -7.0, 0.0, "log N")), "X": np.zeros((4, 2))}

@@ -69,9 +69,9 @@ class Variable:
 
 
 def _more_digits(low: float, high: float) -> int:
-    """Return how many more digits tell numbers from low to high apart: 2 of 1013.1 and 1014.6, 0 of 0.1 and 0.6."""
+    """Return how many more digits tell numbers from low to high apart: 3 of 1013.1 and 1014.6, 0 of 0.1 and 0.6."""
     size, width = max(abs(low), abs(high)), high - low
-    return min(max(math.floor(math.log10(size)) - math.floor(math.log10(width)) - 1, 0), 12) if width > 0.0 else 0
+    return min(round(math.log10(size) - math.log10(width)), 12) if width > 0.0 and size > width else 0
 
 
 @dataclass(frozen=True)

@@ -129,7 +129,7 @@ class RobotStudy:
             if differences:
                 raise InputError(
                     f"study '{name}' exists in {opened.shown} with other settings: {'; '.join(differences)}. "
-                    "Drop those options to resume it, or choose another name."
+                    "Give what is in the study, or leave out what is not, to resume it; or choose another name."
                 )
         return found
 

@@ -63,7 +63,7 @@ def trials_of_csv(
     Raises
     ------
     InputError
-        If the file cannot be read, or a column is missing.
+        If the file cannot be read, or a column is missing or there twice.
     """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
@@ -74,6 +74,8 @@ def trials_of_csv(
     for column in (*names.values(), value):
         if column not in columns:
             raise InputError(f"file {path!r} has no column {column!r}; it has {', '.join(columns) or 'none'}.")
+        if columns.count(column) > 1:
+            raise InputError(f"file {path!r} has {columns.count(column)} columns {column!r}; leave one.")
     found = []
     measured = {name: column for name in outputs for column in (name, f"output_{name}") if column in columns}
     for row in reader:
