@@ -9,7 +9,7 @@ from surehold.problems import GaussianBumps, robust_score
 from surehold.reports import gather
 from surehold.reports.plots import result_report
 from surehold.reports.surfaces import surfaces_of
-from surehold.reports.verdict import verdict
+from surehold.reports.verdict import coordinates, verdict
 
 
 def test_answers_and_traces(gm_result, gm_report):
@@ -32,8 +32,12 @@ def test_the_answer_over_conditions_is_the_trial_of_its_setting():
     assert result.X[index, 0] == pytest.approx(x[0], abs=1e-9)
     nearest = int(np.argmin(np.abs(box.to_unit(result.X) - box.to_unit(x)).max(axis=1)))
     assert abs(result.X[nearest, 0] - x[0]) > 1e-6, "the nearest trial is the right one: the test shows nothing"
-    np.testing.assert_allclose(gather.candidate(result, "recommended", index, None).x, x)
     assert x[1] == pytest.approx(0.5)
+    report = result_report(result)
+    shown = report.recommended.x
+    np.testing.assert_array_equal(shown, result.X[index], "the value that is shown belongs to the trial's condition")
+    assert report.recommended.quality == -((shown[0] - 0.6) ** 2) * (1.0 + shown[1])
+    assert coordinates(report, report.recommended).endswith("(drawn)")
 
 
 def test_surfaces_are_the_model(gm_result, gm_report):

@@ -224,3 +224,19 @@ def test_shares_of_several_executions_are_not_said_to_be_trials():
     assert "The 4 trials succeeded in 62.5 % of their executions on average" in told.text
     told = verdict(report(answer, y=np.array([1.0, 0.0, 0.0, 1.0]), counted=True))
     assert "50 % of the 4 trials succeeded" in told.text
+
+
+def test_a_lower_value_is_no_loss_where_values_are_minimized():
+    sides = [
+        replace(shaken(label, quality, values), minimized=True)
+        for label, quality, values in (
+            ("lowest observed", 0.01, 0.2 + 0 * SPREAD),
+            ("recommended", 0.3, 0.1 + 0 * SPREAD),
+        )
+    ]
+    told = verdict(report(*sides, y=np.array([0.01, 0.3, 0.9, np.nan]), best_trace=np.full(4, 0.01), minimized=True))
+    assert told.headline == (
+        "The lowest dip (0.0100) was refused: when the input is off it is as high as 0.200, "
+        "the recommended point 0.100."
+    )
+    assert "lost more than half" not in told.text

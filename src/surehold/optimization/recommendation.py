@@ -97,7 +97,8 @@ class Recommendation:
     quantile
         The value that 95 % of executions are better than: they exceed it, or stay below where the optimizer minimizes.
     observed
-        Value that was told at x; NaN where x was never tried.
+        Value that was told at x; NaN where x was never tried. Where the box has uncontrolled variables: told at this
+        setting, under the condition of that trial.
     n
         Trials with a value that the recommendation rests on.
     outcome_std

@@ -70,12 +70,9 @@ def candidate(
             for share in _SHARES
         }
         details = {**{name: f"{100.0 * p:.0f} %" for name, p in sure.items()}, **(details or {})}
-    held = result.optimizer.box.uncontrolled
     return Candidate(
         label,
-        result.optimizer.reached[index]
-        if told is None or held is None
-        else told.x,  # an answer says no condition but their mean
+        result.optimizer.reached[index],
         float(result.y[index]),
         index,
         np.empty(0) if score is None else score.values,
@@ -156,9 +153,10 @@ def report_of(
                 f"unit given for '{name}', which is no variable; the variables are {', '.join(box.names)}."
             )
     shown = [i for i, name in enumerate(box.names) if name not in hidden]
+    held = np.zeros(box.dimension, dtype=bool) if box.uncontrolled is None else box.uncontrolled.held
     variables = tuple(
-        Variable(name, float(lower), float(upper), (units or {}).get(name, ""))
-        for name, lower, upper in zip(box.names, box.lower, box.upper, strict=True)
+        Variable(name, float(lower), float(upper), (units or {}).get(name, ""), bool(drawn))
+        for name, lower, upper, drawn in zip(box.names, box.lower, box.upper, held, strict=True)
         if name not in hidden
     )
     y, minimized, counted = result.y, optimizer.direction == "minimize", optimizer.outcome == "success"

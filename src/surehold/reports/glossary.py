@@ -27,6 +27,8 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
     """Return the words of the page with their meaning, in the order in which they appear."""
     better = "lower" if report.minimized else "higher"
     words = [("trial", "One input that was tried. Trials are numbered from 0.")]
+    if any(variable.drawn for variable in report.variables):
+        words.append(("drawn", "A condition that nobody sets; shown is that of the trial."))
     if report.n_initial:
         words.append(("initial design", "Trials spread evenly over all inputs, before there is a model to choose by."))
     if report.counted:

@@ -271,7 +271,8 @@ def _expected(report: RunReport, candidate: Candidate, deviation: float | None) 
 
 
 def _heading(variable: Variable) -> str:
-    return f"{variable.name} [{variable.table_unit}]" if variable.table_unit else variable.name
+    unit = f" [{variable.table_unit}]" if variable.table_unit else ""
+    return f"{variable.name}{unit}{' (drawn)' * variable.drawn}"
 
 
 def _setting(value: Any) -> str:

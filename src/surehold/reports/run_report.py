@@ -36,6 +36,7 @@ class Variable:
     lower: float
     upper: float
     unit: str = ""  #: "m", "rad", any other unit as text, or "" for none
+    drawn: bool = False  #: whether nobody sets it, see `optimization.uncontrolled`
 
     @property
     def factor(self) -> float:

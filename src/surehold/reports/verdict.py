@@ -61,7 +61,7 @@ def coordinates(report: RunReport, candidate: Candidate) -> str:
     for variable, value in zip(report.variables, candidate.x, strict=True):
         unit = variable.table_unit
         space = "" if unit in ("", "°") else " "
-        parts.append(f"{variable.name} = {coordinate(variable, value)}{space}{unit}")
+        parts.append(f"{variable.name} = {coordinate(variable, value)}{space}{unit}{' (drawn)' * variable.drawn}")
     if candidate.trial is not None:
         parts += [f"{name} = {texts[candidate.trial]}" for name, texts in report.choices.items()]
     return ", ".join(parts)
@@ -265,8 +265,13 @@ def _sentence(report: RunReport, candidate: Candidate, subject: str) -> str:
 
 
 def halved(candidate: Candidate) -> int:
-    """Return in how many re-queries the point lost more than half of its exact value; 0 where that says nothing."""
-    return int(np.sum(candidate.values < 0.5 * candidate.quality)) if candidate.quality > 0.0 else 0
+    """Return in how many re-queries the point lost more than half of its exact value; 0 where that says nothing.
+
+    Where values are minimized a lower one is no loss.
+    """
+    if candidate.minimized or not candidate.quality > 0.0:
+        return 0
+    return int(np.sum(candidate.values < 0.5 * candidate.quality))
 
 
 def change(candidate: Candidate) -> str:
