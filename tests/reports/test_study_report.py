@@ -191,3 +191,15 @@ def test_trials_are_shown_where_they_were_and_the_best_of_all_may_be_no_answer(t
     assert "The best feasible value found is 0.900" in page
     assert "The highest observed trial gave 1.1, but reached a place outside of the box." in page
     assert "highest observed<" not in page
+
+
+def test_a_study_that_began_where_nothing_is_allowed_has_a_report(tmp_path):
+    settings = StudySettings(SearchSpace({"x": (0.0, 1.0)}), None, {}, {"n_initial": 1, "allowed": ["x <= 0.5"]})
+    study = RobotStudy.create("began", settings, str(tmp_path / "j.log"))
+    study.add({"x": 0.9}, 2.0)
+    with pytest.raises(InputError, match="no trial at an allowed input"):
+        study_report(study)
+    study.add({"x": 0.4}, 1.0)
+    report = study_report(study)
+    assert report.recommended.quality == 1.0
+    assert "The highest observed trial gave 2, but is not allowed." in report.notes

@@ -22,7 +22,7 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
     Raises
     ------
     InputError
-        If no trial has given a value yet.
+        If no trial has given a value, at an allowed input, yet.
     """
     stored = {trial.number: trial for trial in study.trials()}
     history = history_of(stored.values(), study.settings.space, outputs=study.sampler.outputs)
@@ -42,7 +42,11 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
             outputs=history.outputs[:count],
             of=history.executions[:count],
         )
-        recommendations[count] = optimizer.recommend()
+        try:
+            recommendations[count] = optimizer.recommend()
+        except InputError:  # there was no answer yet: the trials so far were at inputs that are not allowed
+            if count == n:
+                raise
     sign = 1.0 if study.settings.direction == "maximize" else -1.0
     best = sign * np.fmax.accumulate(sign * values)
     trials = []

@@ -110,12 +110,12 @@ def trials_of_study(
     sign = 1.0 if study.direction.name == direction.upper() else -1.0
     watched = study.user_attrs.get(SETTINGS, {}).get("optimizer", {}).get("constraints") or {}
     found = []
-    for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.FAIL)):
-        failed = trial.state == TrialState.FAIL
+    for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.PRUNED, TrialState.FAIL)):
+        failed = trial.state == TrialState.FAIL or not trial.values
         stored = trial.user_attrs.get(REACHED, {})
         parameters = {name: trial.params[there] for name, there in names.items() if there in trial.params}
         reached = {name: stored[there] for name, there in names.items() if there in stored}
-        value = None if failed or not trial.values else sign * trial.values[0]
+        value = None if failed else sign * trial.values[0]
         where = f"{study.study_name}, trial {trial.number}"
         of = None if failed else trial.user_attrs.get(EXECUTIONS)
         told = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
