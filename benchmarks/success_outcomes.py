@@ -1,7 +1,7 @@
 """Trials that only succeed or fail: the true probability of what is recommended, calibration, and the time of an ask.
 
-`python -m benchmarks.success_outcomes [--seeds 20] [--trials 40] [--problems rkhs,gm,nes-polynomial]
-[--methods success,beta,values,tpe,random]`
+`python -m benchmarks.success_outcomes --rows FILE [--seeds 20] [--trials 40] [--problems rkhs,gm,nes-polynomial]
+[--methods success,beta,values,tpe,random]`. A row is written for each run: what is stopped goes on where it was.
 
 A function of a shipped problem, standardized over its box, becomes a probability, p(x) = Phi(2.5 z(x)). Methods:
 success (`outcome="success"`), beta (the same with `surrogate="beta_process"`), values (a Gaussian process with inferred
@@ -10,7 +10,9 @@ the success model).
 """
 
 import argparse
+import json
 import time
+from pathlib import Path
 
 import numpy as np
 from scipy.special import ndtr
@@ -86,6 +88,7 @@ def ask_seconds(method, n, d=3):
 def main():
     """Print all tables."""
     parser = argparse.ArgumentParser()
+    parser.add_argument("--rows", type=Path, default=None, help="file of finished runs; made or continued")
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--trials", type=int, default=40)
     parser.add_argument("--no-time", action="store_true", help="leave the time of an ask out")
@@ -93,31 +96,66 @@ def main():
     parser.add_argument("--methods", default="success,beta,values,tpe,random")
     parser.add_argument("--problems", default="rkhs,gm,nes-polynomial")
     arguments = parser.parse_args()
+    if arguments.problems and arguments.rows is None:
+        parser.error("give --rows FILE for the runs")
     methods = arguments.methods.split(",")
     for n in () if arguments.no_time else map(int, arguments.sizes.split(",")):
         for method in [m for m in (*methods, "plain") if m in ("success", "beta", "plain")]:
             print(f"ask at n = {n}, d = 3: {method} {ask_seconds(method, n):.3f} s CPU", flush=True)
     budgets = tuple(b for b in BUDGETS if b <= arguments.trials)
-    pairs = {}
-    for name in filter(None, arguments.problems.split(",")):
+    rows = stored(arguments.rows)
+    problems = list(filter(None, arguments.problems.split(",")))
+    for name in problems:
         box, p = probability_of(name)
-        results = {}
         for seed in range(arguments.seeds):
             for method in methods:
+                if (name, seed, method) in rows:
+                    continue
                 if method == "tpe":
-                    found = tpe_run(box, p, seed, budgets)
+                    found, calibration = tpe_run(box, p, seed, budgets), []
                 else:
                     found, calibration = surehold_run(method, box, p, seed, budgets)
-                    pairs.setdefault(method, []).extend(calibration)
-                results.setdefault(method, []).append(found)
-                print(f"{name} seed {seed} {method}: {np.round(found, 4).tolist()}", flush=True)
-        for method, found in results.items():
-            table = np.array(found)
-            error = table.std(axis=0, ddof=1) / np.sqrt(len(table))
-            cells = "  ".join(f"{m:.3f} +- {e:.3f}" for m, e in zip(table.mean(axis=0), error, strict=True))
-            print(f"{name:16s} {method:8s} after {budgets}: {cells}  ({len(table)} seeds)", flush=True)
+                asked = [[round(predicted, 4), int(happened)] for predicted, happened in calibration]
+                row = {"problem": name, "seed": seed, "method": method, "found": found, "asked": asked}
+                rows[name, seed, method] = row
+                with arguments.rows.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+    for name in problems:
+        table_of(name, [row for row in rows.values() if row["problem"] == name], budgets)
+    calibration_of(rows.values())
+
+
+def stored(path):
+    """Return the rows of a file by problem, seed and method."""
+    rows = map(json.loads, path.read_text().splitlines() if path is not None and path.exists() else ())
+    return {(row["problem"], row["seed"], row["method"]): row for row in rows}
+
+
+def table_of(name, rows, budgets):
+    """Print what each method recommends, and what "success" recommends less that, paired by seed."""
+    found = {}
+    for row in rows:
+        found.setdefault(row["method"], {})[row["seed"]] = row["found"]
+    for method, mine in found.items():
+        seeds = sorted(set(mine) & set(found.get("success", mine)))
+        table = np.array([mine[seed] for seed in seeds])
+        less = np.array([found["success"][seed] for seed in seeds]) - table if "success" in found else 0.0 * table
+        both = f"{cells(table)}   success less this: {cells(less)}"
+        print(f"{name:16s} {method:8s} after {budgets}: {both}  ({len(seeds)} seeds)")
+
+
+def cells(table):
+    error = table.std(axis=0, ddof=1) / np.sqrt(len(table))
+    return "  ".join(f"{m:+.3f} ({e:.3f})" for m, e in zip(table.mean(axis=0), error, strict=True))
+
+
+def calibration_of(rows):
+    """Print predicted and happened shares of the trials after the initial design, by tenths of the prediction."""
+    pairs = {}
+    for row in rows:
+        pairs.setdefault(row["method"], []).extend(row["asked"])
     for method, told in pairs.items():
-        predicted, happened = np.array(told).reshape(-1, 2).T
+        predicted, happened = np.array(told, dtype=float).reshape(-1, 2).T
         for k in range(10):
             inside = (predicted >= k / 10) & (predicted < (k + 1) / 10)
             if inside.sum() > 1:

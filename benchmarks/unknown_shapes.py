@@ -8,8 +8,10 @@ shape    distance of the true surface to the one believed [mm], mean and 95 %, o
          chosen on these
 grasp    a grasp is planned on a half view (1,000 points, 1 mm): on 8 draws of the shape, on the mean surface alone, and
          on the cloud mirrored and believed; then it is queried 200 times on the true shape under input noise
-draws    how far normals of draws and of the mean surface are off [degrees, medians], and the logarithm of the joint
-         density of 80 hidden places and their normals, for each place
+draws    what a grasp planned on the mean surface is worth: in truth, there, and on draws of a process of that spread
+         and length (surehold.grasping.shape.completion.DRAWN was chosen so on the training shapes); how far normals of
+         draws and of the mean surface are off [degrees, medians]; and the logarithm of the joint density of 80 hidden
+         places and their normals, for each place
 explore  from a box: the true worth of the answer after 10, 20, 40, 50 and 80 trials
 search   the same of optimization that learns no shape, and after 100 trials
 time     of an update of the shape in an exploration that has made 200 contacts
@@ -33,7 +35,7 @@ from surehold.grasping.object.distance_field import distance_field_of
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.shipped import OBJECTS, shipped_object
 from surehold.grasping.object.solids import RevolvedProfile, RoundedBox, triangles
-from surehold.grasping.shape.completion import SPREAD, belief_of_cloud
+from surehold.grasping.shape.completion import DRAWN, SPREAD, belief_of_cloud
 from surehold.grasping.shape.implicit_surface import Observations
 from surehold.grasping.shape.kernel import covariance
 from surehold.grasping.shape.point_cloud import cleaned
@@ -42,6 +44,7 @@ from surehold.problems.grasp.default_poses import default_facet
 from surehold.problems.grasp.exploration import Exploration, belief_of_box
 from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.grasp.touch import touch_trial
+from surehold.problems.perturbation import perturbed_points
 
 NOISE = sh.InputNoise.unit(0.03)
 SEVEN = ("dx", "dy", "dz", "rx", "ry", "rz", "s1")
@@ -130,9 +133,8 @@ def grasp(objects, args):
             _, cloud = view_of(obj, view, 1000, 0.001)
             belief = belief_of_cloud(cloud, name=name, mass=obj.mass, friction=obj.friction, cell=0.004)
             mean, *draws = belief.objects(8, np.random.default_rng(0))
-            trusted = (
-                belief if belief.surface.prior is belief.surface.first else belief.with_surface(belief.surface.prior)
-            )
+            surface = belief.surface
+            trusted = belief if surface.prior is surface.first else replace(belief, surface=surface.prior)
             problem = GraspProblem(mean, default_facet(obj), plan="shapes")
             real = problem.on(obj)
             row = {}
@@ -160,17 +162,29 @@ def drawn(objects, args):
             if known(args, key):
                 continue
             camera, cloud = view_of(obj, view, 1000, 0.001)
-            belief = belief_of_cloud(cloud, cell=0.004, spread=(args.spread, args.length))
-            mean, *draws = belief.objects(4, np.random.default_rng(0))
-            row = {}
+            process = (args.spread, args.length)
+            belief = belief_of_cloud(cloud, mass=obj.mass, friction=obj.friction, cell=0.004, drawn=process)
+            mean, *draws = belief.objects(8, np.random.default_rng(0))
+            row = believed(mean, draws, obj, view)
             for which, bodies in (("mean", [mean]), ("draws", draws)):
                 off = [normals_off(body, field, camera) for body in bodies]
                 row[f"{which}, seen"], row[f"{which}, hidden"] = np.mean(off, axis=0)
             places, normals = surface_points(obj, 1500, np.random.default_rng(0))
             hidden = hidden_mask(field, places, camera)
-            row["density"] = joint_density(belief.surface, *farthest(places[hidden], normals[hidden], 80))
+            row["density"] = joint_density(belief.shapes, *farthest(places[hidden], normals[hidden], 80))
             write(args, key, row)
     table(args, ("object", "spread", "length"))
+
+
+def believed(mean, draws, obj, view):
+    """Return what a grasp planned on the mean shape is worth under input noise: in truth, on that shape, on draws."""
+    problem = GraspProblem(mean, default_facet(obj))
+    x = sh.maximize(problem, problem.box, TRIALS, input_noise=NOISE, n_initial=INITIAL, seed=view).recommendation.x
+    points = perturbed_points(x, problem.box, NOISE, 32, seed=3)
+    true, on_mean, *on_draws = (
+        np.mean([max(problem.on(body).grasp(point).quality, 0.0) for point in points]) for body in (obj, mean, *draws)
+    )
+    return {"true": true, "on the mean": on_mean, "on draws": np.mean(on_draws), "spread": np.std(on_draws)}
 
 
 def normals_off(body, field, camera):
@@ -319,9 +333,11 @@ def main():
     parser.add_argument("--training", action="store_true")
     parser.add_argument("--points", type=int, nargs="+", default=[500, 2000, 5000])
     parser.add_argument("--noises", type=float, nargs="+", default=[0.0, 1.0, 3.0])
-    parser.add_argument("--spread", type=float, default=SPREAD[0])
-    parser.add_argument("--length", type=float, default=SPREAD[1])
+    parser.add_argument("--spread", type=float, help="of the surface; for draws, of their process")
+    parser.add_argument("--length", type=float)
     args = parser.parse_args()
+    usual = DRAWN if args.what == "draws" else SPREAD
+    args.spread, args.length = args.spread or usual[0], args.length or usual[1]
     objects = own = training_objects()
     if not args.training:
         objects = {name: own[name] if name in own else shipped_object(name) for name in args.objects.split(",")}

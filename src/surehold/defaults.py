@@ -5,7 +5,7 @@ the whole rather than this value against others, it says so. Tolerances that onl
 stay in the module that needs them.
 
 Three more stand beside the compiled functions that use them, because Numba's cache notices changes of that file only:
-`_WIDE` and `_NARROW` of `surrogates.local_global`, the widths of its two parts in box widths, and `_NU` of
+`WIDE` and `NARROW` of `surrogates.local_global.density`, the widths of its two parts in box widths, and `_NU` of
 `samplers.elliptical_slice`, the degrees of freedom of its proposals. None of them was measured against other values.
 
 "Box widths" are widths of the unit cube, in which the optimizer works; "particles" are the equally likely settings of

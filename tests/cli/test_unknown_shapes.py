@@ -267,11 +267,13 @@ def test_contacts_come_over_http_as_well(here):
 
 def test_an_unseen_side_under_the_contacts_is_said(here):
     from surehold.cli.grasp import known_at
-    from surehold.problems.grasp.from_cloud import object_of_cloud
+    from surehold.problems.grasp.from_cloud import belief_of_file, object_of_cloud
     from surehold.problems.grasp.options import checked_words
     from surehold.problems.grasp.problem import GraspProblem
 
-    body = object_of_cloud(checked_words({"object": "", "cloud": "bottle.npz", "shapes": 3}))[0]
+    words = checked_words({"object": "", "cloud": "bottle.npz", "shapes": 3})
+    body = object_of_cloud(words)[0]
+    assert body.deviation == pytest.approx(belief_of_file(words)[0].surface.deviation(body.vertices))
     with np.load("bottle.npz") as file:
         seen, camera = file["points"], file["camera"]
     problem = GraspProblem(shipped_object("bottle")).on(body)

@@ -6,7 +6,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 import surehold as sh
 from surehold.optimization.diagnosis import Diagnosis, diagnosis, shares
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
-from surehold.optimization.surrogates.local_global import LocalGlobalProcess
+from surehold.optimization.surrogates.local_global.model import LocalGlobalProcess
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
 

@@ -226,10 +226,9 @@ def drawn(problem: Any, outcome: Any) -> Any:
 
     scene = drawn_scene(grasp_scene(problem.simulator, outcome))
     body = problem.object
-    if not body.draws:
+    if body.deviation is None:
         return scene
-    away = np.stack([draw.distances.distance(body.vertices) for draw in body.draws])
-    meshes = shape_meshes(body.vertices, body.faces, np.sqrt(np.mean(away**2, axis=0)), see_through=True)
+    meshes = shape_meshes(body.vertices, body.faces, body.deviation, see_through=True)
     return replace(scene, meshes=(*meshes, *scene.meshes[1:]), legend=LEGEND)
 
 
@@ -259,10 +258,12 @@ def losses(problem: Any, x: Any, noise: Any, seed: int) -> dict[str, str]:
 
 def known_at(problem: Any, points: Any) -> dict[str, str]:
     """Return how well an unknown shape is known at the contacts (c, 3) of a grasp, and what to do if it is not."""
-    if not problem.object.draws or not len(points):
+    from scipy.spatial import KDTree
+
+    body = problem.object
+    if body.deviation is None or not len(points):
         return {}
-    off = np.stack([draw.distances.distance(points) for draw in problem.object.draws])
-    deviation = float(np.sqrt(np.mean(off**2)))
+    deviation = float(np.sqrt(np.mean(body.deviation[KDTree(body.vertices).query(points)[1]] ** 2)))
     advice = "; this side was not seen: scan it, or touch it and give --contacts" if deviation > _UNSEEN else ""
     return {"shape at the contacts": f"known to {1e3 * deviation:.1f} mm{advice}"}
 

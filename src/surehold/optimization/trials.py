@@ -17,12 +17,9 @@ from surehold.defaults import ROUNDED
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit, checked_outputs
-from surehold.optimization.points import column_of
+from surehold.optimization.stored_trials import checked_columns
 from surehold.optimization.trial_inputs import trial_input, trial_inputs
 from surehold.optimization.values import (
-    LARGEST,
-    LARGEST_SQUARED,
-    checked_pairs,
     number_of,
     outliers_among,
     shares_won,
@@ -269,50 +266,27 @@ class Trials:
         pairs: ArrayLike = (),
     ) -> None:
         """Take over trials whose inputs are points of the unit cube, as they are."""
-        d = self._box.dimension
-        inputs, actual, waiting = (
-            np.asarray(points, dtype=np.float64).reshape(-1, d) for points in (commanded, reached, pending)
+        stored = checked_columns(
+            self._box.dimension,
+            len(self.limits),
+            self._counted,
+            commanded=commanded,
+            y=y,
+            reached=reached,
+            pending=pending,
+            numbers=numbers,
+            outputs=outputs,
+            executions=executions,
+            deviations=deviations,
+            pairs=pairs,
         )
-        compared = checked_pairs(pairs, len(inputs))
-        values = np.zeros(len(inputs)) if len(compared) else np.asarray(y, dtype=np.float64)
-        if values.shape != (len(inputs),) or len(actual) != len(inputs):
-            raise InputError(
-                f"y has shape {values.shape} and reached {len(actual)} rows, but X has {len(inputs)} rows; give one "
-                "value and one reached input a trial."
-            )
-        if (huge := np.abs(values) > LARGEST).any():
-            row = int(np.argmax(huge))
-            raise InputError(
-                f"y holds {values[row]:g} at row {row}; give numbers up to {LARGEST:g}, or NaN for failed trials."
-            )
-        measured = (
-            np.full((len(inputs), len(self.limits)), np.nan) if outputs is None else column_of("outputs", outputs)
-        )
-        if measured.shape != (len(inputs), len(self.limits)) or (np.abs(measured) > LARGEST_SQUARED).any():
-            raise InputError(
-                f"outputs have shape {measured.shape}; give one number up to {LARGEST_SQUARED:g}, or NaN, for each of "
-                f"{len(inputs)} trials and {len(self.limits)} constraints."
-            )
-        of = np.ones(len(inputs), dtype=np.intp) if executions is None else np.asarray(executions)
-        if of.shape != values.shape or (len(of) and (of.dtype.kind not in "iu" or np.any(of < 1))):
-            raise InputError(f"of is {executions!r}; give a whole number of executions, 1 or more, for each trial.")
-        whole = np.abs(of * values - np.round(of * values)) < 1e-6
-        if self._counted and not np.all((values >= 0.0) & (values <= 1.0) & whole):
-            raise InputError("y holds a number that is no share of successes; give successes divided by executions.")
-        spread = np.zeros(len(inputs)) if deviations is None else column_of("noise", deviations)
-        if spread.shape != values.shape or not np.all((spread >= 0.0) & (spread <= LARGEST_SQUARED)):
-            raise InputError(f"noise holds no standard deviation, 0 to {LARGEST_SQUARED:g}, for some trial.")
-        total = len(inputs) + len(waiting)
-        given = np.arange(total) if numbers is None or total == 0 else np.asarray(numbers)
-        whole = given.shape == (total,) and given.dtype.kind in "iu" and np.all(given >= 0)
-        if not whole or len(np.unique(given)) < total:
-            raise InputError(f"numbers are {numbers!r}; give {total} different whole numbers, those pending last.")
-        self._outputs = [tuple(row) for row in measured.tolist()]
-        self._executions, self._deviations = of.tolist(), spread.tolist()
-        self._commanded, self._reached = list(inputs), list(actual)
-        self._values, self._numbers = values.tolist(), given[: len(values)].tolist()
-        self._pending = dict(zip(given[len(values) :].tolist(), waiting, strict=True))
-        self._pairs = [(int(better), int(worse)) for better, worse in compared]
+        told = len(stored.values)
+        self._outputs = [tuple(row) for row in stored.outputs.tolist()]
+        self._executions, self._deviations = stored.executions.tolist(), stored.deviations.tolist()
+        self._commanded, self._reached = list(stored.commanded), list(stored.reached)
+        self._values, self._numbers = stored.values.tolist(), stored.numbers[:told].tolist()
+        self._pending = dict(zip(stored.numbers[told:].tolist(), stored.pending, strict=True))
+        self._pairs = [(int(better), int(worse)) for better, worse in stored.pairs]
         if self._pairs:
             self._take_shares()
 

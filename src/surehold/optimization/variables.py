@@ -163,7 +163,7 @@ def variable_of(name: Any, given: Any) -> Variable:
         return given
     try:
         parts = [part.item() if isinstance(part, np.generic) else part for part in given]
-        if isinstance(given, str) or len(parts) < 2:
+        if isinstance(given, (str, set, frozenset)) or len(parts) < 2:  # sets have no order
             raise TypeError
         chosen = all(isinstance(part, (str, bool)) for part in parts)
         lower, upper = (0.0, 0.0) if chosen else (float(parts[0]), float(parts[1]))

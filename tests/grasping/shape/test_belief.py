@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,26 @@ def test_draws_follow_from_the_generator_alone(belief):
         belief.values(1)
 
 
+def test_draws_are_of_the_process_of_shapes_where_there_is_one(belief):
+    other = surface_of(BOX, belief.surface.observations, 0.002, 0.06)
+    both = ShapeBelief(belief.surface, belief.grid, shapes=other)
+    mean, *draws = both.values(3, np.random.default_rng(0))
+    assert np.array_equal(mean, belief.values()[0])
+    assert np.array_equal(draws, ShapeBelief(other, belief.grid).values(3, np.random.default_rng(0))[1:])
+
+
+def test_both_processes_know_what_is_told(belief):
+    other = surface_of(BOX, belief.surface.observations, 0.002, 0.06)
+    place = np.array([[-0.02, 0.0, 0.0]])
+    told = belief.surface.observations + Observations(place, np.zeros(1), np.full(1, 1e-4))
+    free = np.array([[-0.05, 0.0, 0.0, 0.004]])
+    after = ShapeBelief(belief.surface, belief.grid, shapes=other).knowing(told, free)
+    for surface, before in ((after.surface, belief.surface), (after.shapes, other)):
+        assert (surface.std, surface.length) == (before.std, before.length)
+        assert abs(surface.value(place)[0]) < 3e-4 < 3e-3 < abs(before.value(place)[0])
+    assert np.array_equal(after.free, free)
+
+
 def test_values_between_coarse_nodes_are_those_of_all_nodes_near_the_surface(belief):
     values = belief.values()[0]
     exact = belief.surface.value(belief.grid.nodes).reshape(values.shape)
@@ -75,7 +97,7 @@ def test_no_draw_fills_what_is_free(belief):
     wild = ShapeBelief(surface, belief.grid)
     mean, *draws = wild.values(6, np.random.default_rng(0)).reshape(7, -1)
     assert np.sum(np.array(draws)[:, within] < 0.0) > 0
-    free = wild.with_surface(surface, np.append(place, [[0.012]], axis=1))
+    free = replace(wild, free=np.append(place, [[0.012]], axis=1))
     same, *lifted = free.values(6, np.random.default_rng(0)).reshape(7, -1)
     assert np.all(np.array(lifted)[:, within] >= 0.0)
     assert np.array_equal(mean, same)

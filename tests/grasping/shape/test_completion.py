@@ -49,6 +49,18 @@ def test_a_bottle_is_known_where_it_was_seen_and_honest_where_not():
     assert inside[hidden].mean() > 0.8
 
 
+def test_normals_of_drawn_shapes_are_those_of_an_object():
+    obj, camera, cloud = seen("bottle")
+    field = distance_field_of(obj)
+    for body in belief_of_cloud(cloud, mass=0.3).objects(4, np.random.default_rng(0))[1:]:
+        places = body.vertices[body.faces].mean(axis=1)
+        own, true = distance_field_of(body).gradient(places), field.gradient(places)
+        off = np.degrees(np.arccos(np.clip(np.sum(own * true, axis=1), -1.0, 1.0)))
+        hidden = hidden_mask(field, places - field.distance(places)[:, None] * true, camera)
+        assert np.median(off[~hidden]) < 12.0
+        assert np.median(off[hidden]) < 27.0  # of friction 0.5, beyond which no finger holds
+
+
 @pytest.mark.parametrize("prior", ["box", "ellipsoid"])
 def test_other_priors_pass_through_the_cloud(prior):
     _, _, cloud = seen("glass")

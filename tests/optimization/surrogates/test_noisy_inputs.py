@@ -3,7 +3,7 @@ import pytest
 
 import surehold as sh
 from surehold.errors import InputError
-from surehold.optimization.surrogates.local_global import LocalGlobalProcess
+from surehold.optimization.surrogates.local_global.model import LocalGlobalProcess
 from surehold.optimization.surrogates.noisy_inputs import averaging, condition_on_noisy_inputs
 
 BOX = sh.Box({"x": (0.0, 2.0), "y": (0.0, 5.0)})

@@ -8,7 +8,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
-from surehold.optimization.surrogates.local_global import LocalGlobalProcess
+from surehold.optimization.surrogates.local_global.model import LocalGlobalProcess
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
 

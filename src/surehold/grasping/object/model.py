@@ -34,6 +34,8 @@ class GraspObject:
     axes: NDArray[np.float64] = field(default_factory=lambda: np.eye(3), repr=False)  #: (3, 3) columns: axes of its box
     distances: "DistanceField | None" = field(default=None, repr=False)  #: where they are known; else they are computed
     draws: "tuple[GraspObject, ...]" = field(default=(), repr=False)  #: equally likely shapes, if its own is unknown
+    #: standard deviation of where the surface is, at each vertex (v,) [m]; None where that is known
+    deviation: NDArray[np.float64] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.friction) and self.friction > 0.0):

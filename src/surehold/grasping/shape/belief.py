@@ -8,6 +8,9 @@
 (Rahimi and Recht 2008; Wilson and others 2020.) The values of all of them on the grid are weighted sums of the same
 kernel values, computed at once. Far from the surface they are computed on every second node and interpolated.
 
+Of a cloud, draws are of another process than the mean (`ShapeBelief.shapes`): one that tells how far the surface may be
+off at a place is so rough that its draws have slopes, and normals, that no object has.
+
 A draw knows no bounds. Where the object is known to be r or farther from a point p, a draw is lifted to what that says
 of every place x, since distances change by no more than the way between: f_b(x) >= r - |x - p|.
 """
@@ -21,7 +24,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError
 from surehold.grasping.object.model import GraspObject
-from surehold.grasping.shape.implicit_surface import ImplicitSurface
+from surehold.grasping.shape.implicit_surface import ImplicitSurface, Observations, surface_of
 from surehold.grasping.shape.kernel import fast_function_values
 from surehold.grasping.shape.level_set import MOST_NODES, Grid, distances_of, grid_around, level_set_mesh, one_piece
 
@@ -46,9 +49,14 @@ class ShapeBelief:
     mass: float | None = None  #: kg; that of `DENSITY` if not known
     friction: float = 0.5
     free: Array = field(default_factory=lambda: np.empty((0, 4)), repr=False)  #: (b, 4) as of `Observations`
+    shapes: ImplicitSurface | None = None  #: of which shapes are drawn, where that is not `surface`
 
     def values(self, draws: int = 0, rng: np.random.Generator | None = None) -> Array:
         """Return f (1 + draws, nx, ny, nz) at the nodes: of the posterior mean first, then of the draws."""
+        if draws and self.shapes is not None:
+            drawn = replace(self, surface=self.shapes, shapes=None).values(draws, rng)
+            drawn[0] = self.values()[0]
+            return drawn
         surface = self.surface
         known = surface.observations
         alpha, beta = surface.alpha, surface.beta
@@ -104,9 +112,18 @@ class ShapeBelief:
         field = distances_of(values, self.grid)
         return GraspObject(self.name, vertices, faces, mass, center, self.friction, axes=axes, distances=field)
 
-    def with_surface(self, surface: ImplicitSurface, free: Array | None = None) -> "ShapeBelief":
-        """Return the belief after other observations, on the same grid; `free` (b, 4) is added to what is free."""
-        return replace(self, surface=surface, free=self.free if free is None else np.vstack([self.free, free]))
+    def knowing(self, told: Observations, free: Array) -> "ShapeBelief":
+        """Return the belief, on the same grid, that knows what is told in place of its observations.
+
+        `told` holds bounds of the distance, too; `free` (b, 4) are those by which draws are lifted.
+        """
+
+        def again(known: ImplicitSurface) -> ImplicitSurface:
+            return surface_of(known.prior, told, known.std, known.length)
+
+        return replace(
+            self, surface=again(self.surface), shapes=None if self.shapes is None else again(self.shapes), free=free
+        )
 
 
 def grid_of(surface: ImplicitSurface, cell: float, growth: float = 2.0, most: int = MOST_NODES) -> Grid:

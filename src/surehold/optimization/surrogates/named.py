@@ -10,7 +10,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.gaussian_process.observations import NoiseName, checked_noise_setting
 from surehold.optimization.surrogates.gaussian_process.outputs import checked_range
-from surehold.optimization.surrogates.local_global import LocalGlobalProcess
+from surehold.optimization.surrogates.local_global.model import LocalGlobalProcess
 from surehold.optimization.surrogates.protocol import Surrogate
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, least_leaf_width
 

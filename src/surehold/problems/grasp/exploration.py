@@ -152,10 +152,8 @@ class Exploration:
             self._free = np.vstack([self._free, each.free[near]])  # active anew: what is learnt may free them
         self._free = self._free[spaced(self._free[:, :3], _FREE_SPACING)]
         if felt:
-            surface = self.belief.surface
             told = replace(self._felt, free=self._free)
-            learnt = surface_of(surface.prior, told, surface.std, surface.length)
-            self.belief = replace(self.belief, surface=learnt, free=np.vstack([self._seen, self._free]))
+            self.belief = self.belief.knowing(told, np.vstack([self._seen, self._free]))
 
     def recommend(self, tried: bool = False) -> ExploredGrasp:
         """Return the grasp that is expected to hold best under shape and hand noise; `tried`: of the trials told."""

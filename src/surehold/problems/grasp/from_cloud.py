@@ -12,7 +12,6 @@ from surehold.errors import InputError, unknown_name
 from surehold.grasping.object.mesh_files import UNITS
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.shape.belief import ShapeBelief
-from surehold.grasping.shape.implicit_surface import surface_of
 from surehold.grasping.shape.prior import PRIORS
 from surehold.problems.grasp.told_contacts import checked_against, contacts_of_file
 
@@ -35,7 +34,8 @@ def object_of_cloud(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
     belief, line = belief_of_file(words)
     mean, *draws = belief.objects(shapes, np.random.default_rng(0))
     size = " x ".join(f"{2e3 * half:.0f}" for half in mean.box_half_extents)
-    return replace(mean, draws=tuple(draws)), f"{line}; mean shape {size} mm, {1e3 * mean.mass:.3g} g"
+    known = replace(mean, draws=tuple(draws), deviation=belief.surface.deviation(mean.vertices))
+    return known, f"{line}; mean shape {size} mm, {1e3 * mean.mass:.3g} g"
 
 
 def belief_of_file(words: Mapping[str, Any]) -> tuple[ShapeBelief, str]:
@@ -83,9 +83,8 @@ def belief_of_file(words: Mapping[str, Any]) -> tuple[ShapeBelief, str]:
     notes = list(cloud.notes)
     if touched is not None:
         checked_against(belief.surface, touched, f"{words['contacts']!r}")
-        known = belief.surface
-        learnt = surface_of(known.prior, known.observations + touched, known.std, known.length)
-        belief = belief.with_surface(learnt, touched.free)
+        told = belief.surface.observations + touched
+        belief = belief.knowing(told, np.vstack([belief.free, touched.free]))
         notes.append(f"{len(touched.points)} touches")
     return belief, "; ".join([f"{file.name}: {len(raw.points):,} points", *notes])
 

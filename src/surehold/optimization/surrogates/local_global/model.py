@@ -9,115 +9,36 @@ Legend
 
     k(x, x') = s2 (l_g(x) l_g(x') c_g(x, x') + l_l(x) l_l(x') c_l(x, x'))
 Martinez-Cantin 2018 ("Funneled Bayesian optimization for design, tuning and control of autonomous systems"). Plain
-arrays and NumPy; only the density of the hyperparameters is compiled.
+arrays and NumPy; only the density of the hyperparameters is compiled (density.py).
 """
 
 from collections import OrderedDict
 from collections.abc import Iterator
-from math import exp, inf, log, pi, sqrt
+from math import exp, log
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surehold.defaults import LOCAL_GLOBAL_BURN_IN, NUGGET, PARTICLES, SURPRISE
-from surehold.optimization.numerics.cholesky import cholesky, solve_lower
 from surehold.optimization.samplers.slice import SliceSamples, slice_sample
-from surehold.optimization.surrogates.gaussian_process.kernels import correlation_and_factor, self_correlation
+from surehold.optimization.surrogates.gaussian_process.kernels import correlation_and_factor
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, fingerprint, learnt_from
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import left_out, surprise
+from surehold.optimization.surrogates.local_global.density import (
+    MATERN52,
+    NARROW,
+    WIDE,
+    fill_prior,
+    fill_shares,
+    log_posterior,
+)
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
-from surehold.store.kernels import njit
 
 __all__ = ["LocalGlobalProcess"]
 
-_WIDE: Final = 10.0
-_NARROW: Final = 0.05
-_MATERN52: Final = 0
 _REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
-_LARGEST: Final = 60.0
-
-
-@njit(cache=True)
-def _log_odds(x, c):
-    """Return log(w_l / w_g) at x (d,)."""
-    total = x.size * log(_WIDE / _NARROW)
-    for k in range(x.size):
-        total += 0.5 * ((x[k] - 0.5) / _WIDE) ** 2 - 0.5 * ((x[k] - c[k]) / _NARROW) ** 2
-    return total
-
-
-@njit(cache=True)
-def _fill_shares(X, c, out):
-    """Fill out (2, n) with lam_g and lam_l at X (n, d)."""
-    for i in range(X.shape[0]):
-        log_odds = _log_odds(X[i], c)
-        odds = exp(-abs(log_odds))
-        small, large = sqrt(odds / (1.0 + odds)), sqrt(1.0 / (1.0 + odds))
-        out[0, i], out[1, i] = (large, small) if log_odds < 0.0 else (small, large)
-
-
-@njit(cache=True)
-def _fill_prior(points, tilt, weights, inverse_l, center, variance, slope):
-    """Fill variance (q,) and, where it has room, slope (q, d) with those of weighted sums at points (q, s, d); s2 = 1.
-
-    tilt (q, s, d) are the derivatives of the points' coordinates by the query's.
-    """
-    q, s, d = points.shape
-    C, F = np.empty((s, s)), np.empty((s, s))
-    shares = np.empty((2, s))
-    for i in range(q):
-        P = points[i]
-        _fill_shares(P, center, shares)
-        variance[i] = 0.0
-        for j in range(2):
-            correlation_and_factor(_MATERN52, P, P, inverse_l[j], C, F)
-            sign = 0.5 if j == 1 else -0.5
-            for a in range(s):
-                for b in range(s):
-                    both = weights[a] * weights[b] * shares[j, a] * shares[j, b]
-                    variance[i] += both * C[a, b]
-                    if slope.shape[0] > 0:
-                        other = shares[1 - j, a] * shares[1 - j, a]
-                        for k in range(d):
-                            log_odds = (P[a, k] - 0.5) / _WIDE**2 - (P[a, k] - center[k]) / _NARROW**2
-                            step = (P[a, k] - P[b, k]) * inverse_l[j, k] ** 2
-                            change = sign * other * log_odds * C[a, b] - F[a, b] * step
-                            slope[i, k] += 2.0 * both * change * tilt[i, a, k]
-
-
-@njit(cache=True)
-def log_posterior(theta, evidence):
-    """Return the log posterior density of theta (3 d + 1,), up to a constant."""
-    n, d = evidence.X.shape
-    value = 0.0
-    for i in range(theta.size):
-        if not abs(theta[i]) < _LARGEST:
-            return -inf
-        if i > 2 * d:
-            if theta[i] < 0.0 or theta[i] > 1.0:
-                return -inf
-        else:
-            value -= 0.5 * ((theta[i] - evidence.prior_mean[i]) / evidence.prior_deviation[i]) ** 2
-    c = theta[2 * d + 1 :]
-    s2 = exp(theta[2 * d])
-    A, local = np.empty((n, n)), np.empty((n, n))
-    self_correlation(evidence.kernel, evidence.X, np.exp(-theta[:d]), A)
-    self_correlation(evidence.kernel, evidence.X, np.exp(-theta[d : 2 * d]), local)
-    shares = np.empty((2, n))
-    _fill_shares(evidence.X, c, shares)
-    for i in range(n):
-        for j in range(i):
-            A[i, j] = s2 * (shares[0, i] * shares[0, j] * A[i, j] + shares[1, i] * shares[1, j] * local[i, j])
-        A[i, i] = s2 * (1.0 + evidence.ratio) + evidence.noise[i]
-    if not cholesky(A):
-        return -inf
-    z = evidence.y.copy()
-    solve_lower(A, z)
-    for i in range(n):
-        value -= 0.5 * z[i] * z[i] + log(A[i, i]) + 0.5 * log(2.0 * pi)
-    return value
 
 
 class _Particle(NamedTuple):
@@ -142,9 +63,9 @@ class _Particle(NamedTuple):
         total, slope = np.zeros((len(P), len(Q))), np.zeros((d if gradient else 0, len(P), len(Q)))
         C, F = np.empty_like(total), np.empty_like(total)
         at_p, at_q = self._shares(P), self._shares(Q)
-        log_odds_slope = (P - 0.5).T / _WIDE**2 - (P - self.center[:, None].T).T / _NARROW**2  # (d, p)
+        log_odds_slope = (P - 0.5).T / WIDE**2 - (P - self.center[:, None].T).T / NARROW**2  # (d, p)
         for j, sign in ((0, -1.0), (1, 1.0)):
-            correlation_and_factor(_MATERN52, P, Q, self.inverse_l[j], C, F)
+            correlation_and_factor(MATERN52, P, Q, self.inverse_l[j], C, F)
             both = at_p[j][:, None] * at_q[j]
             total += both * C
             if gradient:  # d lam_j = +- lam_j lam_other^2 d log_odds / 2
@@ -160,7 +81,7 @@ class _Particle(NamedTuple):
         q, s, d = points.shape
         variance, slope = np.full(q, self.s2 * weights.sum() ** 2), np.zeros((q if gradient else 0, d))
         if s > 1:
-            _fill_prior(
+            fill_prior(
                 np.ascontiguousarray(points),
                 np.ascontiguousarray(tilt),
                 np.ascontiguousarray(weights),
@@ -175,7 +96,7 @@ class _Particle(NamedTuple):
 
     def _shares(self, P: NDArray[np.float64]) -> NDArray[np.float64]:
         shares = np.empty((2, len(P)))
-        _fill_shares(P, self.center, shares)
+        fill_shares(P, self.center, shares)
         return shares
 
 

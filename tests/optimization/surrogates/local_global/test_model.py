@@ -6,7 +6,8 @@ import surehold as sh
 from surehold.errors import InputError
 from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.surrogates.gaussian_process.kernels import correlation
-from surehold.optimization.surrogates.local_global import LocalGlobalProcess, log_posterior
+from surehold.optimization.surrogates.local_global.density import log_posterior
+from surehold.optimization.surrogates.local_global.model import LocalGlobalProcess
 
 RNG = np.random.default_rng(0)
 X = RNG.random((18, 2))

@@ -1,0 +1,1 @@
+"""Local-global processes: rough around a center that is learnt, smooth elsewhere."""
