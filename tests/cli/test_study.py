@@ -20,6 +20,7 @@ def by_name(p):
 @pytest.fixture(autouse=True)
 def here(tmp_path, monkeypatch):
     (tmp_path / "own.py").write_text(OWN)
+    (tmp_path / "twice.csv").write_text("dx,dy,value,value\n0.0,0.0,1.0,2.0\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("SUREHOLD_STORAGE", raising=False)
     return tmp_path
@@ -239,6 +240,7 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("import mug", "give either"),
         ("import mug gone.csv", "cannot be read"),
         ("import mug own.py", "has no column"),
+        ("import mug twice.csv", "2 columns 'value'"),
         ("import mug --study gone", "does not exist"),
         ("recommend mug", "no trial has given a value yet"),
         ("work mug", "says nothing about what its trials are"),
@@ -287,6 +289,22 @@ def test_a_process_of_its_own(here):
 
 
 OWN_RUN = "maximize own.py:hill --bounds x=0:1,y=0:1 --initial 5 --study hill"
+
+
+def test_the_trial_that_was_interrupted_is_not_said_to_be_done(study, here, capsys):
+    (here / "cut.py").write_text(
+        "from pathlib import Path\ndef hill(x):\n    with Path('calls').open('a') as f: f.write('.')\n"
+        "    if Path('calls').stat().st_size == 3: raise KeyboardInterrupt\n    return -float(x[0] ** 2)\n"
+    )
+    command = ["maximize", "cut.py:hill", "--bounds", "x=0:1", "--initial", "4", "--trials", "4", "--study", "cut"]
+    assert run(command) == 0
+    assert study("status cut")["complete"] == 2
+    capsys.readouterr()
+    assert run([*command, "--constraint", "T"]) == 2
+    assert "Give what is in the study, or leave out what is not, to resume it" in capsys.readouterr().err
+    assert run(command) == 0
+    assert "Resuming study cut: 2 trials are done." in capsys.readouterr().out
+    assert study("status cut")["complete"] == 4
 
 
 def test_a_run_is_kept_and_resumed(study, here, capsys):

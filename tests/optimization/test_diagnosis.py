@@ -159,3 +159,9 @@ def test_on_a_lattice_and_with_failed_trials(fixed):
     assert found.n == 13, "the response is learnt from trials that gave a value"
     assert 0.0 <= found.coverage <= 1.0
     assert 0.0 <= found.disagreement <= 1.0
+
+
+def test_repeats_that_differ_say_nothing_where_the_first_at_every_place_gave_the_same():
+    optimizer = sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), seed=0)
+    optimizer.restore([[0.5], [0.5], [0.6]], [2.0, 1.0, 2.0])
+    assert optimizer.diagnosis() is None

@@ -1,6 +1,7 @@
 import inspect
 import io
 import sys
+from html import escape
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from surehold.optimization.maximization import Result, Trial, maximize, minimize
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.progress import progress_bar
-from surehold.optimization.recommendation import Recommendation
+from surehold.optimization.recommendation import Recommendation, in_digits
 from surehold.problems.function import Function
 
 BOX = Box({"x": (-1.0, 2.0)})
@@ -394,7 +395,7 @@ def test_what_is_shown_is_short():
         assert len(repr(shown)) < 200, repr(shown)
     assert "8 trials" in repr(result)
     assert "&lt;x&gt;" in result._repr_html_()
-    assert f"{result.recommendation.mean:.6g}" in result._repr_html_()
+    assert in_digits(result.recommendation.mean, result.recommendation.std, 6) in result._repr_html_()
     for kind in (Recommendation, Result, Trial):
         for name in kind.__dataclass_fields__:
             assert f"\n{name}" in inspect.getdoc(kind), f"help({kind.__name__}) says nothing about {name}"
@@ -436,3 +437,20 @@ def test_progress_is_shown_after_two_seconds_on_a_terminal(monkeypatch, wanted):
 def test_bad_limits(arguments, words):
     with pytest.raises(InputError, match=words):
         maximize(parabola, BOX, n_trials=3, **arguments)
+
+
+def test_what_is_shown_of_a_mixed_box_is_what_can_be_commanded():
+    box = Box({"f": (1e-9, 1e-6, "log"), "grip": ["pinch", "<power>"]})
+    result = minimize(lambda p: 1e6 + np.log(p["f"] / 1e-7) ** 2, box, 8, n_initial=8, seed=0)
+    best, shown = result.recommendation, result._repr_html_()
+    assert f"<th>f</th><td>{best.parameters['f']:.6g}</td>" in shown
+    assert f"<th>grip</th><td>{escape(best.parameters['grip'])}</td>" in shown
+    assert "mean=1e+06" not in repr(result), "and a mean far from zero in the digits that say something"
+
+    def wrong(p):
+        raise ValueError("no rig")
+
+    with pytest.raises(
+        SureholdError, match=r"at x = \{'f': [0-9.]+e-0[6-9], 'grip': '(pinch|<power>)'\}: ValueError: no rig"
+    ):
+        maximize(wrong, box, 8, seed=0)

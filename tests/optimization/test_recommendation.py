@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 import surehold as sh
+from surehold.optimization.recommendation import in_digits
 
 LINE = sh.Box({"x": (-1.0, 1.0)})
 
@@ -56,3 +57,31 @@ def test_straying_trials_do_not_count_the_input_noise_twice():
     values = np.sin(6.0 * (best.x[0] + 0.05 * np.random.default_rng(0).standard_normal(20_000)))
     twice = float(np.sqrt(2.0) * values.std())
     assert best.std < max(twice, 0.2), "with what trials strayed as observation noise it would be 0.3 and more"
+
+
+@pytest.mark.parametrize(("direction", "sign"), [("maximize", 1.0), ("minimize", -1.0)])
+def test_the_best_value_told_from_outside_of_the_box_is_named_and_refused(direction, sign):
+    optimizer = sh.Optimizer(LINE, input_noise=sh.InputNoise({"x": 0.01}), direction=direction, seed=0)
+    for x, reached in ((-0.5, -0.5), (0.0, 0.0), (0.5, 0.5), (0.9, 1.2)):
+        optimizer.tell([x], sign * reached, reached=[reached])
+    best = optimizer.recommend()
+    extreme = "highest" if direction == "maximize" else "lowest"
+    assert best.x[0] == pytest.approx(0.5)
+    assert best.refused == f"The {extreme} observed trial gave {sign * 1.2:g}, but reached a place outside of the box."
+    assert optimizer.feasible.tolist() == [True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("value", "deviation", "text"),
+    [
+        (293.1532, 0.05, "293.153"),
+        (1e6 + 0.0026, 0.014, "1000000.003"),
+        (0.123456, 0.05, "0.1235"),
+        (-5.0, 0.0, "-5"),
+        (1e300, 1e-300, "1e+300"),
+        (np.nan, 1.0, "nan"),
+        (1.0, np.inf, "1"),
+    ],
+)
+def test_a_value_is_said_to_a_tenth_of_its_deviation(value, deviation, text):
+    assert in_digits(value, deviation) == text

@@ -138,6 +138,7 @@ def test_such_a_box_hands_out_trials_by_name_only():
         (["pinch", "pinch"], "each can be there once"),
         ("ab", "list of texts"),
         (3, "list of texts"),
+        ({"a", "b"}, "list of texts"),  # a set has another order in another process
     ],
 )
 def test_what_is_no_variable_is_said(given, words):
@@ -195,3 +196,15 @@ def test_half_a_character_is_refused():
     for bounds in ({"\ud800": (0.0, 1.0)}, {"grip": ["pinch", "\udfff"]}):
         with pytest.raises(InputError, match="half a character"):
             Box(bounds)
+
+
+def test_a_number_names_the_choice_that_is_written_like_it():
+    """JSON and tables turn the choice "7" of a command line into the number 7."""
+    box = Box({"grip": ["a", "7", "True"]})
+    assert [box.as_dict(box.points({"grip": given}))["grip"] for given in (7, np.int64(7), True)] == ["7", "7", "True"]
+    with pytest.raises(InputError, match="choice for 'grip' '8' is unknown"):
+        box.points({"grip": 8})
+
+
+def test_bounds_that_are_close_are_shown_apart():
+    assert repr(Box({"x": (1e12, 1e12 + 0.5)})) == "Box({'x': (1000000000000.0, 1000000000000.5)})"

@@ -3,10 +3,13 @@ import pytest
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.optimization.maximization import Result
 from surehold.optimization.surrogates.protocol import mixture
 from surehold.problems import GaussianBumps, robust_score
 from surehold.reports import gather
+from surehold.reports.plots import result_report
 from surehold.reports.surfaces import surfaces_of
+from surehold.reports.verdict import coordinates, verdict
 
 
 def test_answers_and_traces(gm_result, gm_report):
@@ -29,8 +32,12 @@ def test_the_answer_over_conditions_is_the_trial_of_its_setting():
     assert result.X[index, 0] == pytest.approx(x[0], abs=1e-9)
     nearest = int(np.argmin(np.abs(box.to_unit(result.X) - box.to_unit(x)).max(axis=1)))
     assert abs(result.X[nearest, 0] - x[0]) > 1e-6, "the nearest trial is the right one: the test shows nothing"
-    np.testing.assert_allclose(gather.candidate(result, "recommended", index, None).x, x)
     assert x[1] == pytest.approx(0.5)
+    report = result_report(result)
+    shown = report.recommended.x
+    np.testing.assert_array_equal(shown, result.X[index], "the value that is shown belongs to the trial's condition")
+    assert report.recommended.quality == -((shown[0] - 0.6) ** 2) * (1.0 + shown[1])
+    assert coordinates(report, report.recommended).endswith("(drawn)")
 
 
 def test_surfaces_are_the_model(gm_result, gm_report):
@@ -145,3 +152,26 @@ def test_outliers_are_named_in_the_notes():
     report = gather.report_of(result, candidates, title="wild", settings={}, noise=None)
     assert len(report.notes) == 1
     assert f" {', '.join(map(str, bad))} gave" in report.notes[0]
+
+
+@pytest.mark.parametrize("direction", ["maximize", "minimize"])
+def test_a_better_trial_that_breaks_a_limit_is_named(direction):
+    sign = 1.0 if direction == "maximize" else -1.0
+    run = sh.maximize if direction == "maximize" else sh.minimize
+    box = sh.Box({"x": (0.0, 1.0)})
+    result = run(lambda x: (sign * x[0], {"t": x[0]}), box, 8, n_initial=8, constraints={"t": (None, 0.5)}, seed=0)
+    report = result_report(result)
+    extreme = "highest" if direction == "maximize" else "lowest"
+    assert report.extreme == f"{extreme} feasible"
+    assert sign * report.observed.quality == max(x for x in result.X[:, 0] if x <= 0.5)
+    assert sign * report.best_trace[-1] == sign * report.observed.quality
+    assert any(f"The {extreme} observed trial gave" in note and "missed t by" in note for note in report.notes)
+    assert "feasible" in verdict(report).headline
+
+
+def test_the_answer_is_a_trial_that_gave_a_value_where_another_failed_at_its_place():
+    optimizer = sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), n_initial=3, seed=0)
+    for x, y in ((0.5, None), (0.5, 1.0), (0.2, 0.3)):
+        optimizer.tell([x], y, failed=y is None)
+    result = Result(optimizer, (), optimizer.recommend(), False)
+    assert gather.answers(result) == {"recommended": 1}

@@ -13,7 +13,7 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 import surehold as sh
 from surehold.errors import InputError
 from surehold.reports.interactive import interactive_plots
-from surehold.reports.page import render
+from surehold.reports.page import render, table_rows
 from surehold.reports.study_report import study_report
 from surehold.studies.dashboard import Dashboard
 from surehold.studies.replay import result_of
@@ -70,7 +70,7 @@ def test_a_study_without_values_has_no_report(tmp_path):
     with pytest.raises(InputError, match="no trial with a value yet"):
         study_report(empty)
     empty.tell(empty.ask().id, 0.4)
-    assert "highest trial is also the recommended one" in render(study_report(empty))
+    assert "The best value found is 0.400." in render(study_report(empty))
 
 
 def test_all_kinds_of_parameters_are_drawn(tmp_path):
@@ -87,6 +87,9 @@ def test_all_kinds_of_parameters_are_drawn(tmp_path):
         study.tell(asked.id, asked.parameters["n"] - asked.parameters["f"])
     report = study_report(study)
     assert [v.label for v in report.variables] == ["f [log N]", "n"]
+    answer = study.recommend().parameters
+    rows = dict(table_rows(report))
+    assert float(rows["f [N]"][0]) == pytest.approx(answer["f"], rel=1e-3), "the value, not its logarithm"
     taken = [trial.params["c"] for trial in study.trials()]
     assert report.choices == {"c": tuple(taken)}
     assert f", c = {taken[report.recommended.trial]}" in render(report)
@@ -170,3 +173,33 @@ def test_a_browser_draws_the_dashboard(dashboard, tmp_path):
     )  # fmt: skip
     for title in ("Highest observed and robust value", "Model under the input noise (unscented mean)"):
         assert title in run.stdout, "the plot was not drawn"
+
+
+def test_trials_are_shown_where_they_were_and_the_best_of_all_may_be_no_answer(tmp_path):
+    """The trial of the answer was commanded far from there, and a better one reached a place outside of the box."""
+    settings = StudySettings(SearchSpace({"x": (0.0, 1.0)}), None, {}, {"n_initial": 3})
+    study = RobotStudy.create("astray", settings, str(tmp_path / "j.log"))
+    for x, reached in ((0.2, 0.9), (0.88, 0.4), (0.6, 0.5), (0.95, 1.1)):
+        study.add({"x": x}, reached, reached={"x": reached})
+    report = study_report(study)
+    assert study.recommend().trial == report.recommended.trial == 0
+    assert report.recommended.x == pytest.approx([0.9])
+    assert report.recommended.quality == 0.9
+    assert report.X[:, 0] == pytest.approx([0.9, 0.4, 0.5, 1.1])
+    assert report.best_trace == pytest.approx([0.9, 0.9, 0.9, 0.9])
+    page = render(report)
+    assert "The best feasible value found is 0.900" in page
+    assert "The highest observed trial gave 1.1, but reached a place outside of the box." in page
+    assert "highest observed<" not in page
+
+
+def test_a_study_that_began_where_nothing_is_allowed_has_a_report(tmp_path):
+    settings = StudySettings(SearchSpace({"x": (0.0, 1.0)}), None, {}, {"n_initial": 1, "allowed": ["x <= 0.5"]})
+    study = RobotStudy.create("began", settings, str(tmp_path / "j.log"))
+    study.add({"x": 0.9}, 2.0)
+    with pytest.raises(InputError, match="no trial at an allowed input"):
+        study_report(study)
+    study.add({"x": 0.4}, 1.0)
+    report = study_report(study)
+    assert report.recommended.quality == 1.0
+    assert "The highest observed trial gave 2, but is not allowed." in report.notes

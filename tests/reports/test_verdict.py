@@ -200,3 +200,43 @@ def test_the_paragraph_ends_with_what_is_wrong_with_the_model():
     told, warned = (verdict(report(*candidates, warning=warning)) for warning in ("", "The model is blind."))
     assert warned.text == f"{told.text} The model is blind."
     assert warned.headline == told.headline
+
+
+def test_values_far_from_zero_are_shown_with_the_digits_that_tell_them_apart():
+    """A pressure of 1013 to 1014: at three digits everything would be 1010."""
+    run = {"y": np.array([1013.1, 1014.0, 1014.6, np.nan]), "best_trace": np.array([1013.1, 1014.0, 1014.6, 1014.6])}
+    sides = (
+        shaken("highest observed", 1014.6, 1013.2 + 0.1 * SPREAD),
+        shaken("recommended", 1014.0, 1013.9 + 0 * SPREAD),
+    )
+    told = verdict(report(*sides, **run))
+    assert "The highest peak (1014.60) was refused" in told.headline
+    assert "it is worth only 1013.20, the recommended point 1013.90" in told.headline
+    assert report(*sides).more_digits == 0
+    near = replace(sides[1], x=np.array([1000.123, 0.0]))
+    two = {"variables": (Variable("k", 1000.0, 1000.5), Variable("f", -7.0, 0.0, "log N")), "X": np.zeros((4, 2))}
+    assert coordinates(report(near, **run, **two), near) == "k = 1000.12, f = 1.00 N"
+
+
+def test_shares_of_several_executions_are_not_said_to_be_trials():
+    answer = replace(shaken("recommended", 1.0, []), predicted_mean=0.8, predicted_error=0.1)
+    told = verdict(report(answer, y=np.array([1.0, 0.5, 0.0, 1.0]), counted=True))
+    assert "The 4 trials succeeded in 62.5 % of their executions on average" in told.text
+    told = verdict(report(answer, y=np.array([1.0, 0.0, 0.0, 1.0]), counted=True))
+    assert "50 % of the 4 trials succeeded" in told.text
+
+
+def test_a_lower_value_is_no_loss_where_values_are_minimized():
+    sides = [
+        replace(shaken(label, quality, values), minimized=True)
+        for label, quality, values in (
+            ("lowest observed", 0.01, 0.2 + 0 * SPREAD),
+            ("recommended", 0.3, 0.1 + 0 * SPREAD),
+        )
+    ]
+    told = verdict(report(*sides, y=np.array([0.01, 0.3, 0.9, np.nan]), best_trace=np.full(4, 0.01), minimized=True))
+    assert told.headline == (
+        "The lowest dip (0.0100) was refused: when the input is off it is as high as 0.200, "
+        "the recommended point 0.100."
+    )
+    assert "lost more than half" not in told.text

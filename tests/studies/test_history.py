@@ -1,6 +1,7 @@
 """What a study's trials say, and what is damaged in them."""
 
 import numpy as np
+import optuna
 import pytest
 from optuna.distributions import FloatDistribution
 from optuna.trial import FrozenTrial, create_trial
@@ -9,6 +10,7 @@ import surehold as sh
 from surehold.errors import InputError
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, history_of
 from surehold.studies.search_space import SearchSpace
+from surehold.studies.warm_start import trials_of_study
 
 SPACE = SearchSpace(sh.Box({"x": (0.0, 2.0)}))
 
@@ -53,3 +55,23 @@ def test_a_damaged_trial_is_named(attribute, value):
     object.__setattr__(damaged, f"_{attribute}", value)
     with pytest.raises(InputError, match=r"trial 3 of the study is damaged \(.+\); restore a copy"):
         history_of([trial(0, 0.3), damaged], SPACE, outputs=["torque"])
+
+
+def test_pruned_trials_are_taken_over_as_they_are_read():
+    """Of a study made by Optuna's own means: told where they have a value, failed where they have none."""
+    study = optuna.create_study()
+    study.optimize(pruned, n_trials=3)
+    history = history_of(study.get_trials(), SPACE)
+    found = trials_of_study(study, {"x": "x"}, "minimize")
+    assert [trial.value for trial in found] == [None, 1.0, 2.0]
+    np.testing.assert_array_equal(history.y, [np.nan, 1.0, 2.0])
+    assert [trial.failed for trial in found] == [True, False, False]
+
+
+def pruned(trial):
+    trial.suggest_float("x", 0.0, 2.0)
+    if trial.number == 1:
+        trial.report(1.0, 0)
+    if trial.number < 2:
+        raise optuna.TrialPruned
+    return 2.0

@@ -164,3 +164,17 @@ def test_success_within_limits(tmp_path):
     assert best.outputs["force"] == pytest.approx(best.parameters["x"], abs=0.01)
     study.tell(study.ask().id, failed=True)
     assert len(study.trials()) == 8
+
+
+def test_the_answer_of_trials_that_all_failed_is_the_least_hopeless_of_them(tmp_path):
+    study = created(tmp_path, outcome="success", n_initial=3, constraints={"force": [None, 0.5]})
+    optimizer = Optimizer(
+        Box({"x": (0.0, 1.0)}), outcome="success", n_initial=3, seed=0, constraints={"force": (None, 0.5)}
+    )
+    for _ in range(3):
+        study.tell(study.ask().id, failed=True)
+        optimizer.tell(optimizer.ask_trial(), failed=True)
+        best, wanted = study.recommend(), optimizer.recommend()
+        assert best.parameters == pytest.approx(wanted.parameters, abs=1e-9)
+        assert (best.observed, best.best_value, best.n) == (0.0, 0.0, wanted.n)
+    assert study.promise() is None, "no trial may become the answer, and JSON knows no infinity"

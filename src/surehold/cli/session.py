@@ -244,9 +244,9 @@ def _as_study(
     study = RobotStudy.create(kept.study, settings, storage, resume=True)
     if study.paused is not None:
         raise InputError(f"study '{study.name}' is paused ({study.paused}); resume it with: surehold study resume.")
-    done = len(study.trials())
+    done = sum(trial.state.is_finished() for trial in study.trials())
     if done:
-        console.print(f"Resuming study {study.name}: {done} trials are done.", markup=False)
+        console.print(f"Resuming study {study.name}: {done} trial{'s are' if done > 1 else ' is'} done.", markup=False)
     study.set_stop_rule(StopRule(trials=trials))
     interrupted = False
     best = min if options["direction"] == "minimize" else max

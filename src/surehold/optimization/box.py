@@ -220,7 +220,10 @@ class Box:
             if isinstance(variable, Choice):
                 return repr(list(variable.choices))
             words = [repr(word) for word in variable.described[2:]]
-            return f"({', '.join([f'{variable.low:g}', f'{variable.high:g}', *words])})"
+            low, high = f"{variable.low:g}", f"{variable.high:g}"
+            if low == high:
+                low, high = repr(variable.low), repr(variable.high)
+            return f"({', '.join([low, high, *words])})"
 
         inner = ", ".join(f"{v.name!r}: {shown(v)}" for v in self.variables)
         if self.uncontrolled is None:

@@ -92,6 +92,8 @@ def diagnosis(posterior: Posterior, X: NDArray[np.float64], y: NDArray[np.float6
     mean, variance = mixture(left_out)
     error = (y - mean) / unit
     constant = (y - w @ y) / unit / (1.0 - w)  # the mean, too, has not seen the trial
+    if not w @ constant**2 > 0.0:  # the first trials of all places gave the same
+        return None
     excess = error**2 - constant**2
     gap = float(w @ excess)
     chance = float(np.sqrt(np.sum((w * (excess - gap)) ** 2)))

@@ -16,7 +16,7 @@ from surehold.optimization.evaluation import Evaluation, in_processes, one_by_on
 from surehold.optimization.limits import returned_outputs
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.progress import progress_bar
-from surehold.optimization.recommendation import Recommendation
+from surehold.optimization.recommendation import Recommendation, in_digits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -159,12 +159,12 @@ class Result:
     def _repr_html_(self) -> str:
         from html import escape
 
-        rows = [*zip(self.optimizer.box.names, [f"{v:.6g}" for v in self.recommendation.x], strict=True)]
-        rows += [
-            (name, f"{getattr(self.recommendation, name):.6g}") for name in ("mean", "std", "quantile", "observed")
-        ]
-        cells = "".join(f"<tr><th>{escape(name)}</th><td>{value}</td></tr>" for name, value in rows)
-        said = (self.recommendation.refused, self.recommendation.warning)
+        best = self.recommendation
+        rows = [(name, f"{v:.6g}" if isinstance(v, float) else str(v)) for name, v in best.parameters.items()]
+        rows += [(name, in_digits(getattr(best, name), best.std, 6)) for name in ("mean", "quantile", "observed")]
+        rows.insert(-2, ("std", f"{best.std:.6g}"))
+        cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
+        said = (best.refused, best.warning)
         refused = "".join(f"<p>{escape(text)}</p>" for text in said if text)
         return f"<table><caption>Recommended after {len(self.y)} trials</caption>{cells}</table>{refused}"
 
@@ -245,7 +245,7 @@ def maximize(
                 trial = _told(optimizer, evaluation, len(trials))
                 trials.append(trial)
                 if not tolerate_failures and len(trials) == _PATIENCE < n_trials and all(t.failure for t in trials):
-                    raise _given_up(trials)
+                    raise _given_up(optimizer.box, trials)
                 advance(trial.best)
                 if callback is not None and _ends(callback, trial):
                     stopped = "callback"
@@ -337,9 +337,9 @@ def _close(evaluations: Iterator[Evaluation]) -> None:
         close()
 
 
-def _given_up(trials: list[Trial]) -> SureholdError:
+def _given_up(box: Box, trials: list[Trial]) -> SureholdError:
     last = trials[-1]
     return SureholdError(
-        f"the first {len(trials)} trials failed, so the run is given up; the last one, at x = {last.x.tolist()}: "
+        f"the first {len(trials)} trials failed, so the run is given up; the last one, at x = {box.as_dict(last.x)}: "
         f"{last.failure}. Mend the function, or, if it fails almost everywhere, say tolerate_failures=True."
     )

@@ -218,7 +218,7 @@ class Optimizer(Record):
     @property
     def feasible(self) -> NDArray[np.bool_]:
         """Whether each trial may become the answer, (t,): it gave a value and satisfies all that is required."""
-        return self._trials.successful if self._requirements is None else self._requirements.feasible(self._trials)
+        return self._trials.eligible if self._requirements is None else self._requirements.feasible(self._trials)
 
     def _replaced(self) -> None:
         self._model.forget()
@@ -327,7 +327,10 @@ class Optimizer(Record):
                 exponent=OUTCOME_EXPONENT,
                 allowed=ranking.accurate.allowed,
             )
-            highest = int(np.argmax(history.observed))
+            best = int(np.argmax(history.observed))
+            highest, top = (history.tried[best], float(history.observed[best])), int(np.nanargmax(self._trials.values))
+            if self._trials.values[top] > highest[1]:  # which is no answer
+                highest = self._trials.reached[top], float(self._trials.values[top])
             answer = recommendation(
                 posterior,
                 reached,
@@ -335,7 +338,7 @@ class Optimizer(Record):
                 u,
                 self.box,
                 observed,
-                (history.tried[highest], float(history.observed[highest])),
+                highest,
                 int(self._trials.successful.sum()),
                 self._sign,
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),

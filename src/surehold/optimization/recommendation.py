@@ -7,6 +7,7 @@ Two distributions, both mixtures of normals:
                   noise; what is left of its spread is what the model does not know
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -19,9 +20,20 @@ from surehold.optimization.box import Box
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.surrogates.protocol import Posterior
 
-__all__ = ["Outcome", "Recommendation", "execution_at", "expectation_at", "outliers_in_words", "recommendation"]
+__all__ = [
+    "OUTSIDE",
+    "Outcome",
+    "Recommendation",
+    "execution_at",
+    "expectation_at",
+    "in_digits",
+    "outliers_in_words",
+    "recommendation",
+]
 
 _LEVEL: Final = 0.05
+#: Why a trial that reached such a place is no answer.
+OUTSIDE: Final = "reached a place outside of the box."
 
 
 @dataclass(frozen=True)
@@ -85,7 +97,8 @@ class Recommendation:
     quantile
         The value that 95 % of executions are better than: they exceed it, or stay below where the optimizer minimizes.
     observed
-        Value that was told at x; NaN where x was never tried.
+        Value that was told at x; NaN where x was never tried. Where the box has uncontrolled variables: told at this
+        setting, under the condition of that trial.
     n
         Trials with a value that the recommendation rests on.
     outcome_std
@@ -130,7 +143,8 @@ class Recommendation:
 
     def __repr__(self) -> str:
         x = np.array2string(self.x, precision=6, separator=", ")
-        return f"Recommendation(x={x}, mean={self.mean:.6g}, std={self.std:.3g}, quantile={self.quantile:.6g})"
+        mean, quantile = (in_digits(value, self.std, 6) for value in (self.mean, self.quantile))
+        return f"Recommendation(x={x}, mean={mean}, std={self.std:.3g}, quantile={quantile})"
 
     def probability_below(self, value: float) -> float:
         """Return the probability that the next execution gives less than `value`."""
@@ -157,6 +171,13 @@ def outliers_in_words(numbers: Sequence[int]) -> str:
         f"so far on the bad side of all others that {'they count' if several else 'it counts'} as the worst of those. "
         "Nothing is to be done if that is how the place is; a trial that gave no measurement is better told as failed."
     )
+
+
+def in_digits(value: float, deviation: float, least: int = 4) -> str:
+    """Return a value in `least` digits, or, where it is far from 0, in as many as show a tenth of the deviation."""
+    known = value and math.isfinite(value) and 0.0 < deviation < math.inf
+    apart = math.log10(abs(value)) - math.log10(deviation) if known else 0.0
+    return f"{value:.{min(max(least, math.ceil(apart) + 2), 15)}g}"
 
 
 def execution_at(
@@ -196,7 +217,7 @@ def recommendation(
     noise_variance: float | None = None,
     warning: str = "",
 ) -> Recommendation:
-    """Describe u (d,) of the unit cube; `highest` is the best observed trial and its value.
+    """Describe u (d,) of the unit cube; `highest` is where the best observed trial was, and its value.
 
     `sign` is that of the values in which the answer is given: -1 where what was told has been turned over.
     """
@@ -208,14 +229,20 @@ def recommendation(
     unit = float(np.abs(spread).max()) or 1.0  # squares may overflow
     variance = weights @ (spread / unit) ** 2
     refused = ""
-    if np.any(np.abs(highest[0] - u) > 1e-6):
+
+    def said(value: float) -> str:
+        return in_digits(sign * value, outcome.std)
+
+    best, worse = ("highest", "less") if sign > 0.0 else ("lowest", "more")
+    if np.any(np.abs(highest[0] - 0.5) > 0.5):
+        refused = f"The {best} observed trial gave {said(highest[1])}, but {OUTSIDE}"
+    elif np.any(np.abs(highest[0] - u) > 1e-6):
         other = execution_at(posterior, reached, highest[0], noise_variance)
-        best, worse = ("highest", "less") if sign > 0.0 else ("lowest", "more")
         refused = (
-            f"The {best} observed trial gave {sign * highest[1]:.4g}, but under the noise {sign * other.mean:.4g} is "
-            f"expected, and {worse} than {sign * other.quantile(_LEVEL):.4g} once in twenty executions; of the "
-            f"recommended one {sign * outcome.mean:.4g} is expected, and {worse} than "
-            f"{sign * outcome.quantile(_LEVEL):.4g} once in twenty."
+            f"The {best} observed trial gave {said(highest[1])}, but under the noise {said(other.mean)} is "
+            f"expected, and {worse} than {said(other.quantile(_LEVEL))} once in twenty executions; of the "
+            f"recommended one {said(outcome.mean)} is expected, and {worse} than "
+            f"{said(outcome.quantile(_LEVEL))} once in twenty."
         )
     x = box.from_unit(u)
     return Recommendation(

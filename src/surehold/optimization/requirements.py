@@ -30,7 +30,7 @@ from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.output_models import OutputModels
-from surehold.optimization.recommendation import Recommendation, execution_at
+from surehold.optimization.recommendation import OUTSIDE, Recommendation, execution_at
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
 from surehold.optimization.trials import Trials, same
@@ -217,7 +217,7 @@ class Requirements:
         if not self._allowed_at(trials)[k]:
             return f"{start}is not allowed."
         if not trials.eligible[k]:
-            return f"{start}reached a place outside of the box."
+            return start + OUTSIDE
         if (model := self._where_it_fails(trials)) is not None and not self._ranking.exact_inputs:
             share = float(
                 np.exp(Succeeds(model, self._ranking.accurate).log_probability(trials.places[k : k + 1])[0][0])

@@ -122,8 +122,8 @@ class Choice(NamedTuple):
             if choice is value or (value == choice and isinstance(value, bool) == isinstance(choice, bool)):
                 return i
         texts = [str(choice) for choice in self.choices]
-        if isinstance(value, str) and value in texts:
-            return texts.index(value)
+        if isinstance(value, (str, int, float, np.generic)) and str(value) in texts:
+            return texts.index(str(value))
         raise unknown_name(f"choice for '{self.name}'", value, texts)
 
     def checked(self, value: Any, what: str) -> Any:
@@ -163,7 +163,7 @@ def variable_of(name: Any, given: Any) -> Variable:
         return given
     try:
         parts = [part.item() if isinstance(part, np.generic) else part for part in given]
-        if isinstance(given, str) or len(parts) < 2:
+        if isinstance(given, (str, set, frozenset)) or len(parts) < 2:  # sets have no order
             raise TypeError
         chosen = all(isinstance(part, (str, bool)) for part in parts)
         lower, upper = (0.0, 0.0) if chosen else (float(parts[0]), float(parts[1]))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from surehold.reports.run_report import Candidate, RunReport, Surface
-from surehold.reports.verdict import number
+from surehold.reports.verdict import worth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,7 +99,7 @@ def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
     )
     axes.set_xlim(edges[0], edges[-1])
     axes.set_ylim(0.0, 1.18 * tallest)
-    axes.set_xlabel(f"{report.quality_name} (◆ mean {number(candidate.mean)})")
+    axes.set_xlabel(f"{report.quality_name} (◆ mean {worth(report, candidate.mean)})")
     axes.set_ylabel("re-queries")
     axes.xaxis.set_major_locator(MaxNLocator(nbins=5))  # more would overlap where numbers are long
     axes.yaxis.set_major_locator(MaxNLocator(nbins=3, integer=True))

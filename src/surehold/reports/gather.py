@@ -21,6 +21,7 @@ from surehold.reports.run_report import (
     Scene,
     SceneMesh,
     Variable,
+    extreme_of,
 )
 from surehold.reports.surfaces import surfaces_of
 
@@ -36,17 +37,17 @@ _OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
 def answers(result: Result) -> dict[str, int]:
     """Return the trials to show by label, the best "observed" and "recommended"; one entry if they are the same."""
     box = result.optimizer.box
-    apart = np.abs(box.to_unit(result.X) - _unit_answer(result))
+    reached = result.optimizer.reached
+    apart = np.abs(box.to_unit(reached) - _unit_answer(result))
     if box.uncontrolled is not None:  # an answer has no condition: trials are of what can be set
         apart = apart[:, ~box.uncontrolled.held]
-    recommended = int(np.argmin(apart.max(axis=1)))
+    recommended = int(np.argmin(np.where(np.isfinite(result.y), apart.max(axis=1), np.inf)))
     if result.optimizer.outcome == "success":  # a trial that succeeded is no peak
         return {"recommended": recommended}
     highest = result.best_index
-    if recommended == highest or np.array_equal(result.X[recommended], result.X[highest]):
+    if recommended == highest or np.array_equal(reached[recommended], reached[highest]):
         return {"recommended": highest}
-    extreme = "lowest" if result.optimizer.direction == "minimize" else "highest"
-    return {f"{extreme} observed": highest, "recommended": recommended}
+    return {f"{_extreme(result)} observed": highest, "recommended": recommended}
 
 
 def candidate(
@@ -69,10 +70,9 @@ def candidate(
             for share in _SHARES
         }
         details = {**{name: f"{100.0 * p:.0f} %" for name, p in sure.items()}, **(details or {})}
-    held = result.optimizer.box.uncontrolled
     return Candidate(
         label,
-        result.X[index] if told is None or held is None else told.x,  # an answer says no condition but their mean
+        result.optimizer.reached[index],
         float(result.y[index]),
         index,
         np.empty(0) if score is None else score.values,
@@ -90,7 +90,7 @@ def candidate(
 
 
 def _of_constraints(result: Result) -> list[str]:
-    """Return in words whether the recommended input satisfies what was required besides a good value."""
+    """Return in words what was required besides a good value, and why the best one told is no answer."""
     best, trials = result.recommendation, result.optimizer.feasible
     found: list[str] = []
     if best.outputs:
@@ -99,6 +99,11 @@ def _of_constraints(result: Result) -> list[str]:
             f"Expected of the recommended input besides: {expected}; {best.feasible:.1%} of executions keep all "
             f"limits. {int(trials.sum())} of {len(trials)} trials are feasible."
         )
+    reported = int(np.any(result.optimizer.reached != result.X, axis=1).sum())
+    if reported:
+        found.append(f"Trials are shown where they were, which {reported} of {len(trials)} told.")
+    if _extreme(result).endswith("feasible"):
+        found.append(best.refused)
     return found
 
 
@@ -148,9 +153,10 @@ def report_of(
                 f"unit given for '{name}', which is no variable; the variables are {', '.join(box.names)}."
             )
     shown = [i for i, name in enumerate(box.names) if name not in hidden]
+    held = np.zeros(box.dimension, dtype=bool) if box.uncontrolled is None else box.uncontrolled.held
     variables = tuple(
-        Variable(name, float(lower), float(upper), (units or {}).get(name, ""))
-        for name, lower, upper in zip(box.names, box.lower, box.upper, strict=True)
+        Variable(name, float(lower), float(upper), (units or {}).get(name, ""), bool(drawn))
+        for name, lower, upper, drawn in zip(box.names, box.lower, box.upper, held, strict=True)
         if name not in hidden
     )
     y, minimized, counted = result.y, optimizer.direction == "minimize", optimizer.outcome == "success"
@@ -162,7 +168,7 @@ def report_of(
     return RunReport(
         title=title,
         variables=variables,
-        X=result.X[:, shown],
+        X=optimizer.reached[:, shown],
         y=y,
         n_initial=optimizer.n_initial,
         best_trace=_running_best(np.where(_countable(result) & (not counted), y, np.nan), minimized),
@@ -219,10 +225,13 @@ def _unit_answer(result: Result) -> NDArray[np.float64]:
 
 
 def _countable(result: Result) -> NDArray[np.bool_]:
-    """Tell which trials may be the best one, (t,): those that keep all limits, or all where none does."""
+    """Tell which trials may be the best one, (t,): the feasible ones, or all where none is."""
     feasible = result.optimizer.feasible
-    limited = any(not limit.watched for limit in result.optimizer.limits)
-    return feasible if limited and feasible.any() else np.ones(len(result.y), dtype=bool)
+    return feasible if feasible.any() else np.ones(len(result.y), dtype=bool)
+
+
+def _extreme(result: Result) -> str:
+    return extreme_of(result.y, float(result.y[result.best_index]), result.optimizer.direction == "minimize")
 
 
 def _running_best(y: NDArray[np.float64], minimized: bool) -> NDArray[np.float64]:

@@ -27,12 +27,17 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
     """Return the words of the page with their meaning, in the order in which they appear."""
     better = "lower" if report.minimized else "higher"
     words = [("trial", "One input that was tried. Trials are numbered from 0.")]
+    if any(variable.drawn for variable in report.variables):
+        words.append(("drawn", "A condition that nobody sets; shown is that of the trial."))
     if report.n_initial:
         words.append(("initial design", "Trials spread evenly over all inputs, before there is a model to choose by."))
     if report.counted:
         words.append(("success", "1 where a trial succeeded, 0 where it did not; the share of several executions."))
     else:
         words.append(("hit exactly", "The value of the trial itself, which reached its input."))
+    if report.extreme.endswith("feasible"):
+        meaning = "Fit to be the answer: allowed, inside of the box, within all limits, and not prone to fail."
+        words.append(("feasible", meaning))
     if report.noise is not None:
         words += [
             (

@@ -10,9 +10,9 @@ import numpy as np
 from surehold.reports import figures
 from surehold.reports.drawing import marked
 from surehold.reports.glossary import glossary
-from surehold.reports.run_report import Candidate, RunReport, Scene, Surface
+from surehold.reports.run_report import Candidate, RunReport, Scene, Surface, Variable
 from surehold.reports.scene import scene_data
-from surehold.reports.verdict import change, coordinates, halved, number, percent, verdict
+from surehold.reports.verdict import change, coordinate, coordinates, halved, number, percent, verdict, worth
 
 __all__ = ["TEMPLATES", "environment", "render", "scene_context", "table_rows"]
 
@@ -56,6 +56,7 @@ def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
             n_failed=int(report.failed.sum()),
             noise_text=_noise_text(report),
             two=len(report.candidates) > 1,
+            heading=_heading,
             cards=[_card(report, c, told.refused, drawings) for c in report.candidates],
             maps=[_map(report, i, drawings, trials) for i in range(len(report.surfaces))],
             trace=Markup(figures.inline_svg(drawings["trace"], "trace", "Best and robust value by trial", hover)),
@@ -151,7 +152,7 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         name = f"shake-{label['role']}"
         text = (
             f"Histogram of {candidate.values.size} re-queries of {what}: mean "
-            f"{number(candidate.mean)}, worst {number(candidate.worst)}"
+            f"{worth(report, candidate.mean)}, worst {worth(report, candidate.worst)}"
         )
         svg = Markup(figures.inline_svg(drawings[figures.shake_name(candidate)], name, text))
     return {
@@ -160,11 +161,11 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         "tag": tag,
         "tag_class": "no" if tag == "refused" else "yes",
         "where": coordinates(report, candidate),
-        "quality": percent(candidate.predicted_mean) if report.counted else number(candidate.quality),
+        "quality": percent(candidate.predicted_mean) if report.counted else worth(report, candidate.quality),
         "quality_is": "of executions are expected to succeed" if report.counted else "hit exactly",
-        "mean": "" if not shaken else percent(candidate.mean) if report.counted else number(candidate.mean),
+        "mean": "" if not shaken else percent(candidate.mean) if report.counted else worth(report, candidate.mean),
         "mean_is": f"of {candidate.values.size} re-queries succeeded" if report.counted else "on average",
-        "worst": number(candidate.worst),
+        "worst": worth(report, candidate.worst),
         "std": number(candidate.std, 2),
         "n": candidate.values.size,
         "halved": halved(candidate),
@@ -175,9 +176,11 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
 
 def _scene_note(report: RunReport, candidate: Candidate) -> str:
     name = candidate.label if report.succeeded else report.called(candidate)
-    parts = [f"{name[0].upper()}{name[1:]}: {number(candidate.quality)} when hit exactly"]
+    parts = [f"{name[0].upper()}{name[1:]}: {worth(report, candidate.quality)} when hit exactly"]
     if candidate.values.size:
-        parts.append(f"{number(candidate.mean)} on average and {number(candidate.worst)} at worst when off")
+        parts.append(
+            f"{worth(report, candidate.mean)} on average and {worth(report, candidate.worst)} at worst when off"
+        )
     if candidate.scene is not None and candidate.scene.contacts is not None:
         n = len(candidate.scene.contacts.points)
         parts.append(f"{n} contact{'' if n == 1 else 's'}")
@@ -203,7 +206,7 @@ def _noise_text(report: RunReport) -> str:
 
 def _hover(report: RunReport, trials: list[dict[str, Any]], view: Surface | None = None) -> dict[str, list[str]]:
     """Return what is said beside the pointer over each mark of a trial, by group of marks."""
-    names, told = [*(variable.label for variable in report.variables), *report.choices], []
+    names, told = [*map(_heading, report.variables), *report.choices], []
     for trial in trials:
         places = [f"{name} {value}" for name, value in zip(names, [*trial["x"], *trial["choices"]], strict=True)]
         told.append("\n".join([f"trial {trial['number']}: {report.quality_name} {trial['y']}", *places]))
@@ -229,9 +232,7 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
     def row(name: str, cell: Any) -> tuple[str, list[str]]:
         return name, [cell(c) for c in every]
 
-    rows = [
-        row(v.label, lambda c, i=i, v=v: number(float(c.x[i]) * v.factor, 4)) for i, v in enumerate(report.variables)
-    ]
+    rows = [row(_heading(v), lambda c, i=i, v=v: coordinate(v, c.x[i], 4)) for i, v in enumerate(report.variables)]
     for name, texts in report.choices.items():
         rows.append(row(name, lambda c, texts=texts: "–" if c.trial is None else texts[c.trial]))
     if any(c.pose for c in every):
@@ -244,29 +245,34 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
         if any(c.values.size for c in every):
             rows.append(row("share of perturbed re-queries that succeeded", lambda c: number(c.mean, 4)))
     else:
-        rows.append(row(f"{report.quality_name}, hit exactly", lambda c: number(c.quality, 4)))
+        rows.append(row(f"{report.quality_name}, hit exactly", lambda c: worth(report, c.quality, 4)))
     if any(c.values.size for c in every) and not report.counted:
         n = max(c.values.size + c.n_failed for c in every)
-        rows.append(row(f"mean of {n} perturbed re-queries", lambda c: number(c.mean, 4)))
-        rows.append(row("95 % of them are better than", lambda c: number(c.bad, 4)))
-        rows.append(row("worst of them", lambda c: number(c.worst, 4)))
+        rows.append(row(f"mean of {n} perturbed re-queries", lambda c: worth(report, c.mean, 4)))
+        rows.append(row("95 % of them are better than", lambda c: worth(report, c.bad, 4)))
+        rows.append(row("worst of them", lambda c: worth(report, c.worst, 4)))
         rows.append(row("standard deviation", lambda c: number(c.std, 3)))
         if any(c.n_failed for c in every):
             rows.append(row("re-queries without value", lambda c: str(c.n_failed)))
     if any(c.predicted_mean is not None for c in every):
         what = "share of executions that succeeds" if report.counted else "mean under the noise"
-        rows.append(row(f"model: {what} ± its uncertainty", lambda c: _expected(c, c.predicted_error)))
+        rows.append(row(f"model: {what} ± its uncertainty", lambda c: _expected(report, c, c.predicted_error)))
     if any(c.predicted_mean is not None for c in every) and not report.counted:
-        rows.append(row("model: one execution ± standard deviation", lambda c: _expected(c, c.predicted_std)))
+        rows.append(row("model: one execution ± standard deviation", lambda c: _expected(report, c, c.predicted_std)))
     names = dict.fromkeys(name for c in every for name in c.details)
     rows.extend(row(name, lambda c, name=name: c.details.get(name, "–")) for name in names)
     return rows
 
 
-def _expected(candidate: Candidate, deviation: float | None) -> str:
+def _expected(report: RunReport, candidate: Candidate, deviation: float | None) -> str:
     if candidate.predicted_mean is None or deviation is None:
         return "–"
-    return f"{number(candidate.predicted_mean, 4)} ± {number(deviation, 2)}"
+    return f"{worth(report, candidate.predicted_mean, 4)} ± {number(deviation, 2)}"
+
+
+def _heading(variable: Variable) -> str:
+    unit = f" [{variable.table_unit}]" if variable.table_unit else ""
+    return f"{variable.name}{unit}{' (drawn)' * variable.drawn}"
 
 
 def _setting(value: Any) -> str:
@@ -278,9 +284,8 @@ def _setting(value: Any) -> str:
 
 
 def _trials(report: RunReport) -> list[dict[str, Any]]:
-    factors = np.array([v.factor for v in report.variables])
     rows = []
-    for i, (x, y) in enumerate(zip(report.X * factors, report.y, strict=True)):
+    for i, (x, y) in enumerate(zip(report.X, report.y, strict=True)):
         notes, style = (["initial"] if i < report.n_initial else []), ""
         if report.observed.trial == i and not report.counted:
             notes.append(f"{report.extreme} observed")
@@ -292,9 +297,9 @@ def _trials(report: RunReport) -> list[dict[str, Any]]:
         rows.append(
             {
                 "number": i,
-                "x": [number(float(v), 4) for v in x],
+                "x": [coordinate(v, value, 4) for v, value in zip(report.variables, x, strict=True)],
                 "choices": [texts[i] for texts in report.choices.values()],
-                "y": "failed" if failed else number(float(y), 4),
+                "y": "failed" if failed else worth(report, float(y), 4),
                 "note": ", ".join(notes),
                 "style": style,
             }

@@ -3,6 +3,7 @@
 Letters: n trials, d variables, q perturbed re-queries of a candidate, c contacts.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -35,6 +36,7 @@ class Variable:
     lower: float
     upper: float
     unit: str = ""  #: "m", "rad", any other unit as text, or "" for none
+    drawn: bool = False  #: whether nobody sets it, see `optimization.uncontrolled`
 
     @property
     def factor(self) -> float:
@@ -50,6 +52,27 @@ class Variable:
     def label(self) -> str:
         """Name and shown unit, as on an axis."""
         return f"{self.name} [{self.shown_unit}]" if self.shown_unit else self.name
+
+    @property
+    def log(self) -> bool:
+        """Whether values are natural logarithms: figures show them as they are, tables and text what they stand for."""
+        return self.unit.split(" ")[0] == "log"
+
+    @property
+    def table_unit(self) -> str:
+        """The unit in tables and text."""
+        return self.shown_unit[3:].strip() if self.log else self.shown_unit
+
+    @property
+    def more_digits(self) -> int:
+        """By how many digits values need more than usual, see `_more_digits`."""
+        return 0 if self.log else _more_digits(self.lower, self.upper)
+
+
+def _more_digits(low: float, high: float) -> int:
+    """Return how many more digits tell numbers from low to high apart: 3 of 1013.1 and 1014.6, 0 of 0.1 and 0.6."""
+    size, width = max(abs(low), abs(high)), high - low
+    return min(round(math.log10(size) - math.log10(width)), 12) if width > 0.0 and size > width else 0
 
 
 @dataclass(frozen=True)
@@ -162,6 +185,13 @@ class Surface:
     note: str = ""  #: such as "slice through the recommended point"
 
 
+def extreme_of(y: Floats, best: float, minimized: bool) -> str:
+    """Return what the best of the values (n,) that may be the answer is: "highest" or "lowest", or that "feasible"."""
+    told = y[np.isfinite(y)]
+    beaten = bool(np.any(told < best if minimized else told > best))
+    return ("lowest" if minimized else "highest") + " feasible" * beaten
+
+
 @dataclass(frozen=True)
 class RunReport:
     """One finished or interrupted run."""
@@ -237,14 +267,20 @@ class RunReport:
         return self.failed | (self.counted & (self.y < 0.5))
 
     @property
+    def more_digits(self) -> int:
+        """By how many digits values need more than usual to be told apart: where all are far from 0."""
+        told = self.y[~self.failed]
+        return _more_digits(float(told.min()), float(told.max())) if told.size else 0
+
+    @property
     def observed(self) -> Candidate:
         """The best trial observed."""
         return self.candidates[0]
 
     @property
     def extreme(self) -> str:
-        """What the best value observed is: "highest" or "lowest"."""
-        return "lowest" if self.minimized else "highest"
+        """What the best value observed is, see `extreme_of`."""
+        return extreme_of(self.y, self.best_trace[-1] if self.y.size else np.nan, self.minimized)
 
     @property
     def recommended(self) -> Candidate:

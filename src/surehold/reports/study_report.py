@@ -32,7 +32,7 @@ def study_report(study: RobotStudy) -> RunReport:
     if ids != list(range(len(ids))):
         notes.append("Trials are numbered from 0 in the order of their ids, of which some gave nothing to show.")
     rule = study.stop_rule
-    rows = [space.decode(x) for x in result.X]
+    rows = [space.decode(x) for x in result.optimizer.reached]
     names = [name for name in space.distributions if name not in box.names]
     return gather.report_of(
         result,
@@ -49,8 +49,10 @@ def study_report(study: RobotStudy) -> RunReport:
 
 
 def _candidate(result: Result, label: str, index: int) -> Candidate:
-    """Return a trial with what the model expects of it; the robot is not asked to make it again."""
+    """Return a trial with what the model expects of it where the input is off; the robot does not make it again."""
     found = gather.candidate(result, label, index, None)
+    if result.optimizer.input_noise is None:
+        return found
     if label == "recommended":
         return replace(found, predicted_mean=result.recommendation.mean, predicted_std=result.recommendation.std)
     mean, _ = result.optimizer.predict(found.x[None, :], under_noise=True)

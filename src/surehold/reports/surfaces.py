@@ -35,6 +35,8 @@ def surfaces_of(
     """
     box, posterior = optimizer.box, optimizer.posterior
     center = np.clip(box.to_unit(candidates[-1]), 0.0, 1.0)
+    if box.uncontrolled is not None:
+        center = box.uncontrolled.at_mean(center)
     among = list(range(box.dimension) if shown is None else shown)
     if not among:
         return ()

@@ -1,16 +1,18 @@
 """The verdict of a run in words, made from its numbers: why the highest peak was refused, or why not."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
 
-from surehold.reports.run_report import Candidate, RunReport
+from surehold.reports.run_report import Candidate, RunReport, Variable
 
 _NOTABLE: Final = 0.1  # share of the range of the values met from which on bad cases count as different
 
-__all__ = ["Verdict", "change", "coordinates", "halved", "number", "percent", "verdict"]
+__all__ = ["Verdict", "change", "coordinate", "coordinates", "halved", "number", "percent", "verdict", "worth"]
 
 
 @dataclass(frozen=True)
@@ -23,25 +25,43 @@ class Verdict:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a value as people write it: `digits` significant digits, no exponent between 0.0001 and 100,000."""
+    """Return a value as people write it: `digits` significant digits, no exponent between 0.0001 and 100,000.
+
+    Nor beyond, where so many digits reach behind the point.
+    """
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0.0:
         return "0"
     size = math.floor(math.log10(abs(value)))
-    if size < -4 or size >= 5:
+    if size < -4 or size >= max(5, digits):
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return f"{mantissa}e{int(exponent)}".replace("-", "−")
     return f"{value:.{max(digits - 1 - size, 0)}f}".replace("-", "−")
+
+
+def worth(report: RunReport, value: float | None, digits: int = 3) -> str:
+    """Return a value of the run as people write it, with as many digits as tell the run's values apart."""
+    return number(value, digits + report.more_digits)
+
+
+def _said(report: RunReport) -> Callable[[float | None], str]:
+    return partial(worth, report)
+
+
+def coordinate(variable: Variable, value: float, digits: int = 3) -> str:
+    """Return a value of a variable as people write it, without its unit."""
+    plain = math.exp(value) if variable.log else float(value) * variable.factor
+    return number(plain, digits + variable.more_digits)
 
 
 def coordinates(report: RunReport, candidate: Candidate) -> str:
     """Return where a candidate is, as `dx = 3.1 mm, rx = 12°`."""
     parts = []
     for variable, value in zip(report.variables, candidate.x, strict=True):
-        unit = variable.shown_unit
+        unit = variable.table_unit
         space = "" if unit in ("", "°") else " "
-        parts.append(f"{variable.name} = {number(float(value) * variable.factor)}{space}{unit}")
+        parts.append(f"{variable.name} = {coordinate(variable, value)}{space}{unit}{' (drawn)' * variable.drawn}")
     if candidate.trial is not None:
         parts += [f"{name} = {texts[candidate.trial]}" for name, texts in report.choices.items()]
     return ", ".join(parts)
@@ -55,9 +75,9 @@ def verdict(report: RunReport) -> Verdict:
 
 def _of_the_run(report: RunReport) -> Verdict:
     highest, answer = report.observed, report.recommended
-    extreme, peak = report.extreme, "lowest dip" if report.minimized else "highest peak"
+    extreme, peak = report.extreme, f"{report.extreme} {'dip' if report.minimized else 'peak'}"
     falls = "rises" if report.minimized else "falls"
-    name, off = report.quality_name, report.disturbance
+    name, off, said = report.quality_name, report.disturbance, _said(report)
     told = report.y[~report.failed]
     if not report.succeeded:
         return _of_nothing(report)
@@ -65,7 +85,7 @@ def _of_the_run(report: RunReport) -> Verdict:
         return _of_successes(report)
     if told.size > 1 and told.max() == told.min():
         return Verdict(
-            f"All {told.size} trials gave the same {name}, {number(float(told[0]))}: nothing was found.",
+            f"All {told.size} trials gave the same {name}, {said(float(told[0]))}: nothing was found.",
             "There is no better or worse to learn from yet, so the point shown is only the first. Run more trials, or "
             "narrow the search to where outcomes differ.",
             False,
@@ -80,7 +100,7 @@ def _of_the_run(report: RunReport) -> Verdict:
                 f"No re-queries with perturbed inputs were made, so nothing is said here about what happens when {off}."
             )
         return Verdict(
-            f"The best {name} found is {number(highest.quality)}.",
+            f"The best{' feasible' * extreme.endswith('feasible')} {name} found is {said(highest.quality)}.",
             f"It was met at {coordinates(report, highest)} ({_trial(highest)} of {report.y.size}). {why}",
             False,
         )
@@ -90,56 +110,56 @@ def _of_the_run(report: RunReport) -> Verdict:
         else:
             why = "The model expects no other trial to hold better."
         return Verdict(
-            f"The {extreme} trial is also the recommended one: {number(answer.quality)} when hit exactly, "
-            f"{number(answer.mean)} on average and {number(answer.worst)} at worst when {off}.",
-            f"{_sentence(answer, 'The recommended point', name)} {why}",
+            f"The {extreme} trial is also the recommended one: {said(answer.quality)} when hit exactly, "
+            f"{said(answer.mean)} on average and {said(answer.worst)} at worst when {off}.",
+            f"{_sentence(report, answer, 'The recommended point')} {why}",
             False,
         )
     gap, error = _difference(report)
     text = (
-        f"{_sentence(highest, f'The {extreme} point', name)} {_sentence(answer, 'The recommended point', name)} "
+        f"{_sentence(report, highest, f'The {extreme} point')} {_sentence(report, answer, 'The recommended point')} "
         f"The means differ by {number(abs(gap))} (standard error {number(error, 2)}, both points shaken alike)."
     )
     lost, kept = halved(highest), halved(answer)
     if abs(gap) <= 2.0 * error and lost - kept > 2.0 * math.sqrt(lost + kept):
         headline = (
-            f"The {peak} ({number(highest.quality)}) was refused: when {off} it loses more than half in "
+            f"The {peak} ({said(highest.quality)}) was refused: when {off} it loses more than half in "
             f"{lost} of {highest.values.size} cases, the recommended point in {kept or 'none'}."
         )
         return Verdict(headline, text, True)
     tail = _tail(report)
-    means, worsts = (f"{number(highest.mean)} and {number(answer.mean)}", f"{number(highest.worst)} at worst")
+    means, worsts = (f"{said(highest.mean)} and {said(answer.mean)}", f"{said(highest.worst)} at worst")
     if abs(gap) <= 2.0 * error and tail > 0:
         headline = (
-            f"The {peak} ({number(highest.quality)}) was refused: when {off} it {falls} to {worsts}, the "
-            f"recommended point to {number(answer.worst)}; on average they are worth about the same, {means}."
+            f"The {peak} ({said(highest.quality)}) was refused: when {off} it {falls} to {worsts}, the "
+            f"recommended point to {said(answer.worst)}; on average they are worth about the same, {means}."
         )
         return Verdict(headline, text, True)
     if abs(gap) <= 2.0 * error and tail < 0:
         headline = (
             f"When {off}, the {extreme} trial and the recommended one are worth about the same on average ({means}), "
-            f"but the recommended one {falls} to {number(answer.worst)} at worst, the other to {number(highest.worst)}."
+            f"but the recommended one {falls} to {said(answer.worst)} at worst, the other to {said(highest.worst)}."
         )
         return Verdict(headline, text, False)
     if abs(gap) <= 2.0 * error:
         headline = (
             f"When {off}, the {extreme} trial and the recommended one are worth about the same: {means} on average, "
-            f"{number(highest.worst)} and {number(answer.worst)} at worst."
+            f"{said(highest.worst)} and {said(answer.worst)} at worst."
         )
         return Verdict(headline, text, False)
     if gap > 0.0:
         deeper = _better(report, highest.worst, answer.worst) > _notable(report)
-        yet = f", but {falls} to {number(answer.worst)} at worst (the other to {number(highest.worst)})" * deeper
-        worth = "as high as" if report.minimized else "worth only"
+        yet = f", but {falls} to {said(answer.worst)} at worst (the other to {said(highest.worst)})" * deeper
+        at = "as high as" if report.minimized else "worth only"
         headline = (
-            f"The {peak} ({number(highest.quality)}) was refused: when {off} it is {worth} {number(highest.mean)}, the "
-            f"recommended point {number(answer.mean)}{yet}."
+            f"The {peak} ({said(highest.quality)}) was refused: when {off} it is {at} {said(highest.mean)}, the "
+            f"recommended point {said(answer.mean)}{yet}."
         )
         return Verdict(headline, text, True)
-    holds = f", although it {falls} only to {number(answer.worst)} at worst (the other to {number(highest.worst)})"
+    holds = f", although it {falls} only to {said(answer.worst)} at worst (the other to {said(highest.worst)})"
     headline = (
         f"The model preferred another point, but the re-queries do not bear it out: when {off} it is worth "
-        f"{number(answer.mean)}, the {peak} {number(highest.mean)}{holds * (tail > 0)}."
+        f"{said(answer.mean)}, the {peak} {said(highest.mean)}{holds * (tail > 0)}."
     )
     text += " More trials near both points would let the model see this."
     return Verdict(headline, text, False)
@@ -172,10 +192,13 @@ def _of_successes(report: RunReport) -> Verdict:
     if answer.values.size:
         again = f"; of {answer.values.size} tried again when {report.disturbance}, {percent(answer.mean)} succeeded"
     sure = " ".join(f"The model is {value} {name}." for name, value in answer.details.items() if name[:5] == "sure ")
+    share = percent(float(told.mean()))
+    made = f"{share} of the {told.size} trials succeeded"
+    if np.any((told > 0.0) & (told < 1.0)):
+        made = f"The {told.size} trials succeeded in {share} of their executions on average"
     return Verdict(
         f"The recommended point is {expected}{again}.",
-        f"It is {coordinates(report, answer)} ({_trial(answer)}). {percent(float(told.mean()))} of the {told.size} "
-        f"trials succeeded, those made to learn included. {sure}".strip(),
+        f"It is {coordinates(report, answer)} ({_trial(answer)}). {made}, those made to learn included. {sure}".strip(),
         False,
     )
 
@@ -209,30 +232,30 @@ def _tail(report: RunReport) -> int:
 
 def _of_the_model(report: RunReport) -> Verdict:
     """Return the verdict where nothing was queried again: what the model expects."""
-    highest, answer, off = report.observed, report.recommended, report.disturbance
-    peak = "lowest dip" if report.minimized else "highest peak"
-    expected = number(answer.predicted_mean)
+    highest, answer, off, said = report.observed, report.recommended, report.disturbance, _said(report)
+    peak = f"{report.extreme} {'dip' if report.minimized else 'peak'}"
+    expected = said(answer.predicted_mean)
     text = f"No re-queries with perturbed inputs were made: what happens when {off} is what the model expects."
     if len(report.candidates) == 1:
         headline = (
-            f"The {report.extreme} trial is also the recommended one: {number(answer.quality)} when hit exactly; when "
+            f"The {report.extreme} trial is also the recommended one: {said(answer.quality)} when hit exactly; when "
             f"{off}, the model expects {expected}."
         )
         return Verdict(headline, text, False)
     headline = (
-        f"The {peak} ({number(highest.quality)}) is not recommended: when {off}, the model expects "
-        f"{number(highest.predicted_mean)} of it, and {expected} of the recommended point."
+        f"The {peak} ({said(highest.quality)}) is not recommended: when {off}, the model expects "
+        f"{said(highest.predicted_mean)} of it, and {expected} of the recommended point."
     )
     where = f"Recommended is {coordinates(report, answer)} ({_trial(answer)} of {report.y.size}). {text}"
     return Verdict(headline, where, True)
 
 
-def _sentence(candidate: Candidate, subject: str, name: str) -> str:
-    n = candidate.values.size
+def _sentence(report: RunReport, candidate: Candidate, subject: str) -> str:
+    n, said = candidate.values.size, _said(report)
     text = (
-        f"{subject} ({_trial(candidate)}) reached a {name} of {number(candidate.quality)} when hit exactly. "
-        f"Queried again {n} times with perturbed inputs it gave {number(candidate.mean)} on average "
-        f"({_change(candidate)}), {number(candidate.worst)} at worst."
+        f"{subject} ({_trial(candidate)}) reached a {report.quality_name} of {said(candidate.quality)} when hit "
+        f"exactly. Queried again {n} times with perturbed inputs it gave {said(candidate.mean)} on average "
+        f"({_change(candidate)}), {said(candidate.worst)} at worst."
     )
     if halved(candidate):
         text += f" In {halved(candidate)} of {n} it lost more than half."
@@ -242,8 +265,13 @@ def _sentence(candidate: Candidate, subject: str, name: str) -> str:
 
 
 def halved(candidate: Candidate) -> int:
-    """Return in how many re-queries the point lost more than half of its exact value; 0 where that says nothing."""
-    return int(np.sum(candidate.values < 0.5 * candidate.quality)) if candidate.quality > 0.0 else 0
+    """Return in how many re-queries the point lost more than half of its exact value; 0 where that says nothing.
+
+    Where values are minimized a lower one is no loss.
+    """
+    if candidate.minimized or not candidate.quality > 0.0:
+        return 0
+    return int(np.sum(candidate.values < 0.5 * candidate.quality))
 
 
 def change(candidate: Candidate) -> str:

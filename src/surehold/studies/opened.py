@@ -92,7 +92,7 @@ class OpenedStudy:
             if differences:
                 raise InputError(
                     f"study '{name}' exists in {opened.shown} with other settings: {'; '.join(differences)}. "
-                    "Drop those options to resume it, or choose another name."
+                    "Give what is in the study, or leave out what is not, to resume it; or choose another name."
                 )
         return found
 
@@ -161,7 +161,10 @@ class OpenedStudy:
         return self.sampler.n_initial(self.settings.space)
 
     def promise(self) -> float | None:
-        """Return the improvement that a further trial is expected to bring; None during the initial design."""
+        """Return the improvement that a further trial is expected to bring.
+
+        None during the initial design, and while no trial may become the answer.
+        """
         with self.storage.failures():
             return self._promise(self._ledger.trials())
 
@@ -187,4 +190,5 @@ class OpenedStudy:
         if len(trials) < self.n_initial or not np.isfinite(history.y).any():
             return None
         with self.sampler.optimizing(self.settings.space, history, self.settings.direction) as optimizer:
-            return optimizer.promise()
+            promise = optimizer.promise()
+            return promise if np.isfinite(promise) else None

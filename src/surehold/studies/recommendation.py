@@ -11,7 +11,7 @@ import numpy as np
 from optuna.study import Study
 
 from surehold.errors import InputError
-from surehold.optimization.recommendation import outliers_in_words
+from surehold.optimization.recommendation import in_digits, outliers_in_words
 from surehold.studies.dashboard_note import read_note, write_note
 from surehold.studies.history import REACHED
 from surehold.studies.sampler import Sampler, direction_of
@@ -68,7 +68,8 @@ class StudyRecommendation:
                 f"{probability:.0%} sure of at least {float(s):.0%}" for s, probability in self.sure.items()
             )
             return f"{self.mean:.1%} of executions succeed; 95% sure of at least {self.quantile:.1%}, {more}"
-        return f"{self.mean:.4g} ± {self.std:.2g}, 95 % better than {self.quantile:.4g}"
+        mean, quantile = in_digits(self.mean, self.std), in_digits(self.quantile, self.std)
+        return f"{mean} ± {self.std:.2g}, 95 % better than {quantile}"
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -118,12 +119,13 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     history = sampler.history(trials, space)
     with sampler.optimizing(space, history, direction) as optimizer:
         best, success = optimizer.recommend(), optimizer.outcome == "success"
-        told = np.flatnonzero(np.isfinite(history.y))
+        y = optimizer.y  # where trials succeed or fail, a failed one is one that did not succeed
+        told = np.flatnonzero(np.isfinite(y))
         distance = np.abs(optimizer.box.to_unit(history.reached[told]) - optimizer.box.to_unit(best.x)).max(axis=1)
         # what was reached outside of the ranges cannot be commanded: the nearest place that can is the answer
         inside = [optimizer.box.contains(place) for place in history.reached]
     same = told[distance <= distance.min() + 1e-9]
-    row, best_row = int(same[np.argmax(sign * history.y[same])]), int(np.nanargmax(sign * history.y))
+    row, best_row = int(same[np.argmax(sign * y[same])]), int(np.nanargmax(sign * y))
     number, best_number = int(history.numbers[row]), int(history.numbers[best_row])
     trial = next(t for t in trials if t.number == number)
     return StudyRecommendation(
@@ -132,9 +134,9 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         best.mean,
         best.std,
         best.quantile,
-        float(history.y[row]),
+        float(y[row]),
         best_number,
-        float(history.y[best_row]),
+        float(y[best_row]),
         best.n,
         best.refused if number != best_number else "",
         tuple(int(history.numbers[i]) for i in best.outliers),
@@ -155,7 +157,7 @@ def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> 
         "| --- | --- |",
         *(f"| {key} | {_shown(value)} {units.get(key, '')} |" for key, value in found.parameters.items()),
         "",
-        f"Expected when the input is off: {found.expected}. It gave {found.observed:.4g} when it was tried. {found.n} "
+        f"Expected: {found.expected}. It gave {in_digits(found.observed, found.std)} when it was tried. {found.n} "
         "trials with a value.",
     ]
     if found.outputs:

@@ -22,16 +22,17 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
     Raises
     ------
     InputError
-        If no trial has given a value yet.
+        If no trial has given a value, at an allowed input, yet.
     """
     stored = {trial.number: trial for trial in study.trials()}
     history = history_of(stored.values(), study.settings.space, outputs=study.sampler.outputs)
     n = len(history.y)
-    if not np.isfinite(history.y).any():
-        raise InputError(f"study '{study.name}' has no trial with a value yet; there is nothing to show.")
-    first = max(study.n_initial, int(np.argmax(np.isfinite(history.y))) + 1)
-    replayed = set(np.unique(np.linspace(min(first, n), n, _REPLAYED).round().astype(int)).tolist())
     optimizer = study.sampler.optimizer(study.study)
+    values = optimizer.y  # where trials succeed or fail, a failed one is one that did not succeed
+    if not np.isfinite(values).any():
+        raise InputError(f"study '{study.name}' has no trial with a value yet; there is nothing to show.")
+    first = max(study.n_initial, int(np.argmax(np.isfinite(values))) + 1)
+    replayed = set(np.unique(np.linspace(min(first, n), n, _REPLAYED).round().astype(int)).tolist())
     recommendations: dict[int, Recommendation] = {}
     for count in sorted(replayed):
         optimizer.restore(
@@ -41,13 +42,17 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
             outputs=history.outputs[:count],
             of=history.executions[:count],
         )
-        recommendations[count] = optimizer.recommend()
+        try:
+            recommendations[count] = optimizer.recommend()
+        except InputError:  # there was no answer yet: the trials so far were at inputs that are not allowed
+            if count == n:
+                raise
     sign = 1.0 if study.settings.direction == "maximize" else -1.0
-    best = sign * np.fmax.accumulate(sign * history.y)
+    best = sign * np.fmax.accumulate(sign * values)
     trials = []
     for i in range(n):
         attributes = stored[int(history.numbers[i])].user_attrs
         failure = "" if np.isfinite(history.y[i]) else attributes.get(VETOED) or attributes.get(NOTE) or "failed"
-        x, y = history.X[i], float(history.y[i])
+        x, y = history.X[i], float(values[i])
         trials.append(Trial(i, x, y, failure, float(best[i]), recommendations.get(i + 1), 0.0))
     return Result(optimizer, tuple(trials), recommendations[n], interrupted)

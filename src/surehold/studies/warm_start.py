@@ -63,7 +63,7 @@ def trials_of_csv(
     Raises
     ------
     InputError
-        If the file cannot be read, or a column is missing.
+        If the file cannot be read, or a column is missing or there twice.
     """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
@@ -74,6 +74,8 @@ def trials_of_csv(
     for column in (*names.values(), value):
         if column not in columns:
             raise InputError(f"file {path!r} has no column {column!r}; it has {', '.join(columns) or 'none'}.")
+        if columns.count(column) > 1:
+            raise InputError(f"file {path!r} has {columns.count(column)} columns {column!r}; leave one.")
     found = []
     measured = {name: column for name in outputs for column in (name, f"output_{name}") if column in columns}
     for row in reader:
@@ -108,12 +110,12 @@ def trials_of_study(
     sign = 1.0 if study.direction.name == direction.upper() else -1.0
     watched = study.user_attrs.get(SETTINGS, {}).get("optimizer", {}).get("constraints") or {}
     found = []
-    for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.FAIL)):
-        failed = trial.state == TrialState.FAIL
+    for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.PRUNED, TrialState.FAIL)):
+        failed = trial.state == TrialState.FAIL or not trial.values
         stored = trial.user_attrs.get(REACHED, {})
         parameters = {name: trial.params[there] for name, there in names.items() if there in trial.params}
         reached = {name: stored[there] for name, there in names.items() if there in stored}
-        value = None if failed or not trial.values else sign * trial.values[0]
+        value = None if failed else sign * trial.values[0]
         where = f"{study.study_name}, trial {trial.number}"
         of = None if failed else trial.user_attrs.get(EXECUTIONS)
         told = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
