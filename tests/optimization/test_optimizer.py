@@ -293,6 +293,7 @@ def test_a_surrogate_of_ones_own():
         ({"k": -2.0, "quadrature": "unscented", "input_noise": NOISE}, "above -2"),
         ({"border": "bounce", "input_noise": NOISE}, "border"),
         ({"kappa": np.nan}, "kappa"),
+        ({"kappa": -1.0}, "0 or more"),
         ({"preset": "thesiss"}, "did you mean 'thesis'"),
         ({"input_noise": InputNoise({"a": 0.1})}, "nothing about b"),
         ({"input_noise": InputNoise(covariance=np.eye(3))}, "2 x 2"),

@@ -210,6 +210,8 @@ def _check(s: SimpleNamespace) -> None:
         value = getattr(s, name)
         if value is not None and not 0 < value < 1:
             raise InputError(f"{name} is {value!r}; give a probability strictly between 0 and 1, such as 0.95.")
+    if s.kappa < 0.0:
+        raise InputError(f"kappa is {s.kappa!r}; give standard deviations to be added, 0 or more.")
 
 
 def _failures_modelled(s: SimpleNamespace) -> float:

@@ -42,7 +42,7 @@ VARIABLES: Final[Mapping[str, str]] = {
 AMPLITUDES: Final[Mapping[str, str]] = {"s2": "rad", "s3": "rad"}
 
 #: What a grasp of an object of unknown shape is worth: that on its mean shape, or the mean over draws of it. Planned on
-#: the draws, grasps of half views were worse on the true shape (benchmarks/unknown_shapes.py grasp).
+#: the draws, which costs as many trials, grasps of half views were no better (benchmarks/unknown_shapes.py grasp).
 PLANS: Final = ("mean", "shapes")
 
 #: What the preset "thesis" sets: the simulator behind the thesis. `s1` then ranges within +-pi.
