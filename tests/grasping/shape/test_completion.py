@@ -61,6 +61,12 @@ def test_normals_of_drawn_shapes_are_those_of_an_object():
         assert np.median(off[hidden]) < 27.0  # of friction 0.5, beyond which no finger holds
 
 
+def test_a_shape_ends_where_nothing_was_seen_below_it():
+    obj, _, cloud = seen("glass")
+    assert cloud.table is None
+    assert belief_of_cloud(cloud).mean_object().box_half_extents[2] < 1.18 * obj.box_half_extents[2]
+
+
 @pytest.mark.parametrize("prior", ["box", "ellipsoid"])
 def test_other_priors_pass_through_the_cloud(prior):
     _, _, cloud = seen("glass")

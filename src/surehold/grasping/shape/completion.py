@@ -9,9 +9,9 @@ Cloud and mirrored cloud make a surface, and that is the prior of another, which
 mirrored side is off is a matter of experience (`SPREAD`, and `DRAWN` for whole shapes), not of the scatter of the
 points.
 
-Free. Between the camera and each point there was nothing, and beside the cloud's outline neither: points there are
-bounds of the distance, by half of what the nearest point of the cloud, or the outline, is away (the surface that was
-not seen may be nearer), `_FREE_REACH` at most.
+Free. Between the camera and each point there was nothing, and beside the cloud's outline neither, also below a bottom
+that was not seen: points there are bounds of the distance, by half of what the nearest point of the cloud, or the
+outline, is away (the surface that was not seen may be nearer), `_FREE_REACH` at most.
 """
 
 from dataclasses import dataclass, replace
@@ -48,6 +48,7 @@ _MOST_SLOPES: Final = 250
 _SLOPE_NOISE: Final = 0.15  # of a normal's components
 _SEEN: Final = 0.01
 _FREE_REACH: Final = 0.010  # m
+_BEYOND: Final = 0.020  # the box: so far points beside the outline are looked at; chosen on the same shapes [m]
 _FREE_STEPS: Final = (0.004, 0.010, 0.020, 0.035, 0.060, 0.090)  # before a point of the cloud [m]
 
 
@@ -148,7 +149,7 @@ def free_points(cloud: PointCloud, shape: PriorShape) -> Array:
             places = cloud.points[mine] + step * back[mine] / far[mine][:, None]
             gap = np.minimum(tree.query(places)[0], _FREE_REACH)
             rows.append(np.column_stack([places, 0.5 * gap]))
-        inside = grid_around(-shape.half, shape.half, max(0.008, float(shape.half.max()) / 12.0), 0.0).nodes
+        inside = grid_around(-shape.half, shape.half, max(0.008, float(shape.half.max()) / 12.0), _BEYOND).nodes
         places = shape.center + inside @ shape.axes.T
         beside = _Image(cloud).beside(places)
         rows.append(np.column_stack([places, np.minimum(0.5 * beside, _FREE_REACH)])[beside > 0.0])
