@@ -39,7 +39,7 @@ CELL: Final = (1.0 / 50.0, 0.002, 0.004)
 SPREAD: Final = (0.4, 0.4)
 #: The same of the process of which whole shapes are drawn. Draws of the one above have normals so far off that a hand
 #: holds hardly any of them; this one is chosen by how near the mean quality on its draws comes to that on the true
-#: shape, on the same shapes: benchmarks/unknown_shapes.py believed.
+#: shape, on the same shapes: benchmarks/unknown_shapes.py draws.
 DRAWN: Final = (0.4, 3.0)
 _BASE_POINTS: Final = 800  # of the cloud, of which the mirrored shape is made
 _MIRROR_NOISE: Final = 0.003  # of a mirrored point [m]

@@ -1,4 +1,4 @@
-"""Its density, and the prior moments of weighted sums (compiled).
+"""The density of a local-global process' hyperparameters, and the prior moments of weighted sums (compiled).
 
 Legend as in `model`; w_g, w_l have the standard deviations `WIDE` and `NARROW`.
 """
