@@ -50,8 +50,8 @@ def described_object(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
         from surehold.problems.grasp.from_cloud import object_of_cloud
 
         return object_of_cloud(given)
-    for option in ("camera", "normals", "contacts", "cloud_noise"):
-        if given[option]:
+    for option in ("camera", "normals", "contacts", "cloud_noise", "prior", "shapes", "plan"):
+        if given[option] not in (None, OPTIONS[option].default):
             raise InputError(f"{option} is for point clouds; give one with cloud, or leave {option} out.")
     if not name:
         raise InputError(f"no object is given; name one of {', '.join(OBJECTS)}, a mesh file, or a cloud.")
