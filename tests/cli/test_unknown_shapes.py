@@ -80,7 +80,7 @@ def test_an_exploration(here, capsys):
         ("grasp", "no object is given"),
         ("grasp mug --cloud bottle.npz", "both object 'mug' and a cloud"),
         ("grasp mug --camera 0,0,0", "camera is for point clouds"),
-        ("grasp mug --plan shapes", "plan is for point clouds"),
+        ("grasp mug --shapes 4", "shapes is for point clouds"),
         ("explore mug --start view --prior box", "prior is for point clouds"),
         ("grasp --cloud bottle.xyz", "--unit mm"),
         ("grasp --cloud bottle.xyz --unit mm --camera 0,0", "three numbers"),
