@@ -184,7 +184,7 @@ def believed(mean, draws, obj, view):
     true, on_mean, *on_draws = (
         np.mean([max(problem.on(body).grasp(point).quality, 0.0) for point in points]) for body in (obj, mean, *draws)
     )
-    return {"true": true, "on the mean": on_mean, "on draws": np.mean(on_draws), "spread": np.std(on_draws)}
+    return {"true": true, "on the mean": on_mean, "on draws": np.mean(on_draws), "apart": np.std(on_draws)}
 
 
 def normals_off(body, field, camera):

@@ -28,9 +28,9 @@ class Thresholds(NamedTuple):
 _NOISE: Final = 0.03  # of the box
 #: By object and facet: grasps of the left iCub hand with the force of its fingers, 8 N.
 MEASURED: Final = {
-    ("bottle", "right-front"): Thresholds(353, 0.037, 0.074),
-    ("mug", "right-front"): Thresholds(400, 0.063, 0.112),
-    ("glass", "right-front"): Thresholds(400, 0.038, 0.078),
+    ("bottle", "right-front"): Thresholds(200, 0.037, 0.074),
+    ("mug", "right-front"): Thresholds(200, 0.063, 0.116),
+    ("glass", "right-front"): Thresholds(200, 0.053, 0.074),
     ("drill", "bottom-front"): Thresholds(200, math.nan, math.nan),
 }
 
