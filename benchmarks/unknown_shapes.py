@@ -178,7 +178,7 @@ def drawn(objects, args):
 
 def believed(mean, draws, obj, view):
     """Return what a grasp planned on the mean shape is worth under input noise: in truth, on that shape, on draws."""
-    problem = GraspProblem(mean, default_facet(obj))
+    problem = GraspProblem(mean, default_facet(obj), plan="mean")
     x = sh.maximize(problem, problem.box, TRIALS, input_noise=NOISE, n_initial=INITIAL, seed=view).recommendation.x
     points = perturbed_points(x, problem.box, NOISE, 32, seed=3)
     true, on_mean, *on_draws = (

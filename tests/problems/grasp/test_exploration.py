@@ -131,13 +131,13 @@ def test_a_hand_that_meets_the_object_on_its_way_feels_it():
 def test_value_over_draws_is_the_mean_over_simulators():
     wider = replace(BOTTLE, friction=0.9)
     both = replace(BOTTLE, draws=(BOTTLE, wider))
-    unknown = GraspProblem("bottle", variables=PROBLEM.box.names, plan="shapes").on(both)
+    unknown = PROBLEM.on(both)
     x = a_grasp()
     expected = [Simulator(obj=obj).grasp(PROBLEM.pose(x), PROBLEM.posture(x)).quality for obj in (BOTTLE, wider)]
     assert expected[0] != expected[1]
     assert unknown.over_shapes(x).tolist() == expected
     assert unknown(x) == pytest.approx(np.mean(expected), abs=1e-15)
-    assert PROBLEM.on(both)(x) == expected[0]  # by default that on the mean shape
+    assert GraspProblem("bottle", variables=PROBLEM.box.names, plan="mean").on(both)(x) == expected[0]
     with pytest.raises(InputError, match="did you mean 'shapes'"):
         GraspProblem("bottle", plan="shape")
 

@@ -41,9 +41,9 @@ VARIABLES: Final[Mapping[str, str]] = {
 #: Further amplitudes of a synergy that was learned with more than two components, and their units.
 AMPLITUDES: Final[Mapping[str, str]] = {"s2": "rad", "s3": "rad"}
 
-#: What a grasp of an object of unknown shape is worth: that on its mean shape, or the mean over draws of it. Planned on
-#: the draws, which costs as many trials, grasps of half views were no better (benchmarks/unknown_shapes.py grasp).
-PLANS: Final = ("mean", "shapes")
+#: What a grasp of an object of unknown shape is worth: the mean over draws of it, which costs as many trials, or that
+#: on its mean shape. Grasps of half views were better where planned on draws (benchmarks/unknown_shapes.py grasp).
+PLANS: Final = ("shapes", "mean")
 
 #: What the preset "thesis" sets: the simulator behind the thesis. `s1` then ranges within +-pi.
 THESIS_SIMULATOR: Final = {
@@ -101,7 +101,7 @@ class GraspOptions(TypedDict, total=False):
         ),
     ]
     plan: Annotated[
-        str, GraspOption("mean", "Worth of a grasp of a cloud: on its mean shape, or the mean over its shapes.", PLANS)
+        str, GraspOption("shapes", "Worth of a grasp of a cloud: mean over its shapes, or on its mean shape.", PLANS)
     ]
     preset: Annotated[str, GraspOption("", "thesis: the simulator of the thesis.", ("", "thesis"))]
     bounds: Annotated[

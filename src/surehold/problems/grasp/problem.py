@@ -51,8 +51,8 @@ class GraspProblem:
     contact, quality, closing, friction, torsion, cones, task, collision, hand, preshape
         As in `surehold.grasping.Simulator`; these and the following are described in options.py.
     plan
-        What a grasp of an object that has `draws` is worth: "mean": that on the object itself, the mean shape;
-        "shapes": the mean over the draws.
+        What a grasp of an object that has `draws` is worth: "shapes" (default): the mean over the draws; "mean": that
+        on the object itself, the mean shape.
     preset
         "thesis": single contacts, the quality "simox", closing "synergy", polyhedral cones, collisions worth 0, and s1
         within ±pi; "" for none.
@@ -200,7 +200,8 @@ class GraspProblem:
         return other
 
     def _value(self, x: NDArray[np.float64]) -> float:
-        return float(self.over_shapes(x).mean()) if self.averaged else self.grasp(x).quality
+        many = self.averaged and self.object.draws
+        return float(self.over_shapes(x).mean()) if many else self.grasp(x).quality
 
     def _one(self, x: ArrayLike) -> NDArray[np.float64]:
         points, _ = checked_points(x, self.box)
