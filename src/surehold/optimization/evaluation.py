@@ -16,6 +16,8 @@ from surehold.optimization.values import LARGEST
 
 __all__ = ["Evaluation", "evaluate", "in_processes", "one_by_one"]
 
+_NOTICED = 10.0  # s
+
 
 class Evaluation(NamedTuple):
     """What came of a trial."""
@@ -126,4 +128,6 @@ def in_processes(optimizer: Optimizer, f: Callable[..., Any], n_trials: int, n_j
     finally:
         for asked, _ in running.values():
             optimizer.forget(asked)
-        pool.shutdown(wait=True, kill_workers=bool(running))
+        waiting = [future for future in running if future.cancel()]
+        wait(waiting, timeout=_NOTICED)  # the pool's thread fails where trials vanish that it has not looked at yet
+        pool.shutdown(wait=True, kill_workers=len(waiting) < len(running))

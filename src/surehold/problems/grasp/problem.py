@@ -123,7 +123,7 @@ class GraspProblem:
                 raise InputError(
                     f"preset '{preset}' sets {name} to {value!r}, but {given[name]!r} is given; leave one of them out."
                 )
-        self.averaged: Final[bool] = given.pop("plan") == "shapes"
+        self._on_shapes: Final[bool] = given.pop("plan") == "shapes"
         self._settings: dict[str, Any] = given | (THESIS_SIMULATOR if preset else {})
         self._settings["preshape"] = given["preshape"] or None
         self._simulator: Simulator | None = None
@@ -179,6 +179,11 @@ class GraspProblem:
         values = [self._value(point) for point in points]
         return values[0] if single else np.array(values)
 
+    @property
+    def averaged(self) -> bool:
+        """Whether the value is the mean over the draws of an object of unknown shape."""
+        return self._on_shapes and bool(self.object.draws)
+
     def over_shapes(self, x: ArrayLike) -> NDArray[np.float64]:
         """Return the quality of the trial at x (d,) on each of the object's draws (b,), or on itself where it has none.
 
@@ -200,8 +205,7 @@ class GraspProblem:
         return other
 
     def _value(self, x: NDArray[np.float64]) -> float:
-        many = self.averaged and self.object.draws
-        return float(self.over_shapes(x).mean()) if many else self.grasp(x).quality
+        return float(self.over_shapes(x).mean()) if self.averaged else self.grasp(x).quality
 
     def _one(self, x: ArrayLike) -> NDArray[np.float64]:
         points, _ = checked_points(x, self.box)
