@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import SureholdError
+from surehold.extras import require
 from surehold.grasping.object.distance_field import DistanceField
 from surehold.store.kernels import njit
 
@@ -99,7 +100,11 @@ def distances_of(values: Array, grid: Grid) -> DistanceField:
 
 
 def level_set_mesh(values: Array, grid: Grid, level: float = 0.0) -> tuple[Array, NDArray[np.int32]]:
-    """Return vertices (v, 3) [m] and faces (f, 3) of the surface f = level, counterclockwise seen from outside."""
+    """Return vertices (v, 3) [m] and faces (f, 3) of the surface f = level, counterclockwise seen from outside.
+
+    Raises MissingExtra if the extra "mesh" is not installed.
+    """
+    require("mesh", "the mesh of a believed shape")
     import igl
 
     padded = np.pad(values, 1, constant_values=float(np.abs(values).max()))  # closed where it leaves the grid

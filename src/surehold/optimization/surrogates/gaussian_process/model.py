@@ -3,9 +3,7 @@
 What is learnt is a `GaussianProcessPosterior`; the formulas of its predictions are in `prediction`.
 """
 
-from collections import OrderedDict
 from collections.abc import Sequence
-from hashlib import sha256
 from math import log, sqrt
 from typing import Final
 
@@ -18,7 +16,6 @@ from surehold.defaults import (
     MANY,
     MANY_LEARNT,
     NUGGET,
-    RELEARNT_DIVISOR,
     SURPRISE,
 )
 from surehold.errors import InputError
@@ -43,11 +40,11 @@ from surehold.optimization.surrogates.gaussian_process.observations import (
 )
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization, checked_range
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
+from surehold.optimization.surrogates.memory import Remembered, fingerprint, learnt_from
 from surehold.optimization.surrogates.protocol import Posterior, mixture
 
-__all__ = ["GaussianProcess", "fingerprint", "learnt_from"]
+__all__ = ["GaussianProcess"]
 
-_REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
 _LOUDEST: Final = 1e100  # standard deviation of the noise, in those of the outputs; its square stays finite
 
 
@@ -130,7 +127,7 @@ class GaussianProcess:
         if self._length_scales is not None and not np.all((self._length_scales > 0) & np.isfinite(self._length_scales)):
             raise InputError(f"length_scales are {length_scales!r}; give positive finite numbers, one a dimension.")
         self._posterior: GaussianProcessPosterior | NeighborPosterior | None = None
-        self._learnt: OrderedDict[bytes, tuple[Standardization, Learnt]] = OrderedDict()  # saves time, changes nothing
+        self._learnt = Remembered[tuple[Standardization, Learnt]]()
 
     def __repr__(self) -> str:
         return f"GaussianProcess(kernel={KERNELS[self._kernel]!r}, noise={self._noise!r})"
@@ -221,13 +218,13 @@ class GaussianProcess:
         """Return the scale of the outputs and the hyperparameters that a part of the trials teaches, once."""
         X, y, noise = X[part], y[part], None if noise is None else noise[part]
         key = fingerprint(X, y, noise, rng.bit_generator.state)
-        if key not in self._learnt:
+
+        def taught() -> tuple[Standardization, Learnt]:
             outputs = self.standardization(y)
             evidence = self._evidence(X, y, outputs, [len(y)], (1.0,), noise)
-            self._learnt[key] = outputs, self._learn(evidence, outputs, rng, None)
-            while len(self._learnt) > _REMEMBERED:
-                self._learnt.popitem(last=False)
-        return self._learnt[key]
+            return outputs, self._learn(evidence, outputs, rng, None)
+
+        return self._learnt.value(key, taught)
 
     def _learn(
         self, evidence: Evidence, outputs: Standardization, rng: np.random.Generator, start: NDArray[np.float64] | None
@@ -383,16 +380,3 @@ def _positive(name: str, value: float) -> float:
     if not (np.isfinite(value) and value > 0.0):
         raise InputError(f"{name} is {value!r}; give a positive finite number.")
     return float(value)
-
-
-def learnt_from(n: int) -> int:
-    """Return k: of n trials, the first k are those that hyperparameters are learnt from; n - n/16 < k <= n."""
-    return n - n % (1 << max(0, n.bit_length() - RELEARNT_DIVISOR.bit_length()))
-
-
-def fingerprint(X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, *others) -> bytes:
-    """Return a digest of trials and of other settings that have a faithful `repr`."""
-    content = sha256(repr((X.shape, noise is None, others)).encode())
-    for array in (X, y) if noise is None else (X, y, noise):
-        content.update(np.ascontiguousarray(array).tobytes())
-    return content.digest()

@@ -12,7 +12,6 @@ Martinez-Cantin 2018 ("Funneled Bayesian optimization for design, tuning and con
 arrays and NumPy; only the density of the hyperparameters is compiled (density.py).
 """
 
-from collections import OrderedDict
 from collections.abc import Iterator
 from math import exp, log
 from typing import Final, NamedTuple
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 from surehold.defaults import LOCAL_GLOBAL_BURN_IN, NUGGET, PARTICLES, SURPRISE
 from surehold.optimization.samplers.slice import SliceSamples, slice_sample
 from surehold.optimization.surrogates.gaussian_process.kernels import correlation_and_factor
-from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, fingerprint, learnt_from
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import left_out, surprise
 from surehold.optimization.surrogates.local_global.density import (
@@ -34,11 +33,10 @@ from surehold.optimization.surrogates.local_global.density import (
     fill_shares,
     log_posterior,
 )
+from surehold.optimization.surrogates.memory import Remembered, fingerprint, learnt_from
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
 
 __all__ = ["LocalGlobalProcess"]
-
-_REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
 
 
 class _Particle(NamedTuple):
@@ -208,7 +206,7 @@ class LocalGlobalProcess:
 
     def __init__(self, output_range: tuple[float, float] | None = None):
         self._stationary: Final = GaussianProcess(output_range=output_range)
-        self._learnt: OrderedDict[bytes, tuple[Standardization, SliceSamples]] = OrderedDict()  # only saves time
+        self._learnt = Remembered[tuple[Standardization, SliceSamples]]()
 
     @property
     def noisy(self) -> bool:
@@ -236,11 +234,9 @@ class LocalGlobalProcess:
     def _learnt_from(self, k: int, X: NDArray[np.float64], y: NDArray[np.float64], stream: int) -> LocalGlobalPosterior:
         """Return the posterior given all trials, with hyperparameters that were learnt from the first k of them."""
         key = fingerprint(X[:k], y[:k], None, stream)
-        if key not in self._learnt:
-            self._learnt[key] = self._learn(X[:k], y[:k], np.random.default_rng([stream, k]))
-            while len(self._learnt) > _REMEMBERED:
-                self._learnt.popitem(last=False)
-        outputs, samples = self._learnt[key]
+        outputs, samples = self._learnt.value(
+            key, lambda: self._learn(X[:k], y[:k], np.random.default_rng([stream, k]))
+        )
         d = X.shape[1]
         inputs, values = np.ascontiguousarray(X), np.ascontiguousarray(outputs.apply(y))
         particles = [

@@ -12,7 +12,6 @@ several places together, which an average over the input noise needs: their corr
 those of a Gaussian copula), so that places which share their evidence agree.
 """
 
-from collections import OrderedDict
 from math import log, sqrt
 from typing import Final
 
@@ -24,12 +23,11 @@ from scipy.special import betaincinv, ndtr
 
 from surehold.defaults import BETA_PRIOR, LENGTH_SCALE_DEVIATION, LENGTH_SCALE_MEDIAN, MANY_LEARNT
 from surehold.errors import InputError
-from surehold.optimization.surrogates.gaussian_process.model import fingerprint, learnt_from
+from surehold.optimization.surrogates.memory import Remembered, fingerprint, learnt_from
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
 
 __all__ = ["BetaPosterior", "BetaProcess", "left_out_likelihood"]
 
-_REMEMBERED: Final = 4  # sets of trials whose length-scales are kept
 _AT_ONCE: Final = 2_000_000  # entries of K at a time
 _RANGE: Final = (log(0.01), log(10.0))  # of length-scales, in box widths
 _JITTER: Final = 1e-8
@@ -182,7 +180,7 @@ class BetaProcess:
         self._scales: Final = None if length_scales is None else np.asarray(length_scales, dtype=np.float64)
         if self._scales is not None and not np.all((self._scales > 0.0) & np.isfinite(self._scales)):
             raise InputError(f"length_scales are {length_scales!r}; give a positive number of box widths each.")
-        self._learnt: OrderedDict[bytes, tuple[NDArray[np.float64], int]] = OrderedDict()  # saves time, changes nothing
+        self._learnt = Remembered[tuple[NDArray[np.float64], int]]()
 
     @property
     def noisy(self) -> bool:
@@ -207,11 +205,8 @@ class BetaProcess:
             return BetaPosterior(places, successes, failures, self._scales, self._prior)
         k = learnt_from(len(y))
         key = fingerprint(X[:k], y[:k], of[:k])
-        if key not in self._learnt:
-            self._learnt[key] = self._learn(*_together(X[:k], (y * of)[:k], of[:k]))
-            while len(self._learnt) > _REMEMBERED:
-                self._learnt.popitem(last=False)
-        return BetaPosterior(places, successes, failures, self._learnt[key][0], self._prior, self._learnt[key][1])
+        scales, cost = self._learnt.value(key, lambda: self._learn(*_together(X[:k], (y * of)[:k], of[:k])))
+        return BetaPosterior(places, successes, failures, scales, self._prior, cost)
 
     def _learn(
         self, X: NDArray[np.float64], successes: NDArray[np.float64], failures: NDArray[np.float64]

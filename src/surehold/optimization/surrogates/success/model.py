@@ -1,7 +1,6 @@
 """Binary outcomes as a surrogate: a Gaussian process behind a probit likelihood, hyperparameters slice-sampled."""
 
 import warnings
-from collections import OrderedDict
 from math import log, sqrt
 from typing import Final
 
@@ -24,14 +23,13 @@ from surehold.defaults import (
 from surehold.errors import InputError
 from surehold.optimization.samplers.elliptical_slice import elliptical_slice_sample
 from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
-from surehold.optimization.surrogates.gaussian_process.model import fingerprint, learnt_from
+from surehold.optimization.surrogates.memory import Remembered, fingerprint, learnt_from
 from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.surrogates.success.laplace import Counts, log_posterior
 from surehold.optimization.surrogates.success.posterior import SuccessPosterior
 
 __all__ = ["SuccessProcess", "counted", "learnt"]
 
-_REMEMBERED: Final = 4  # sets of trials whose hyperparameters are kept
 _LLOYD: Final = 10  # rounds of the clustering
 
 
@@ -68,7 +66,7 @@ class SuccessProcess:
             else np.log(np.append(np.asarray(length_scales, dtype=np.float64), signal_variance))
         )
         self._mean_variance = mean_variance
-        self._learnt: OrderedDict[bytes, tuple[NDArray[np.float64], int]] = OrderedDict()  # saves time, changes nothing
+        self._learnt = Remembered[tuple[NDArray[np.float64], int]]()
 
     @property
     def noisy(self) -> bool:
@@ -95,12 +93,12 @@ class SuccessProcess:
         stream, k = int(rng.integers(2**63)), learnt_from(len(y))
         some = np.linspace(0, k - 1, min(k, MANY_LEARNT)).round().astype(np.intp)
         key = fingerprint(X[some], y[some], of[some], stream)
-        if key not in self._learnt:
+
+        def taught() -> tuple[NDArray[np.float64], int]:
             early = self._counts(X[some], (y * of)[some], of[some])
-            self._learnt[key] = learnt(early, np.random.default_rng([stream, k]))
-            while len(self._learnt) > _REMEMBERED:
-                self._learnt.popitem(last=False)
-        return SuccessPosterior(counts, *self._learnt[key])
+            return learnt(early, np.random.default_rng([stream, k]))
+
+        return SuccessPosterior(counts, *self._learnt.value(key, taught))
 
     def _counts(self, X: NDArray[np.float64], successes: NDArray[np.float64], trials: NDArray[np.float64]) -> Counts:
         return counted(X, successes, trials, self._kernel, self._mean_variance)

@@ -6,7 +6,7 @@ Legend (the thesis' symbols in brackets)
     w_ji  weight of block i in the likelihood of leaf j: (2 / (1 + depth_j - depth_i))^k, 1 and 0 for k = inf  (3.12)
 """
 
-from collections import OrderedDict
+from functools import partial
 from math import inf
 from typing import Final, Literal
 
@@ -16,17 +16,18 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.defaults import LEAF_MARGIN, LEAF_SIZES, MIN_LEAF, UNDIVIDED, WIDEST_LEAF_MARGIN
 from surehold.errors import InputError
 from surehold.optimization.numerics.threads import single_threaded
-from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess, fingerprint
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.gaussian_process.observations import checked_data, checked_noise
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
+from surehold.optimization.surrogates.memory import Remembered, fingerprint
 from surehold.optimization.surrogates.protocol import Posterior, mixture
 from surehold.optimization.surrogates.treed.partition import Partition, grow
 from surehold.optimization.surrogates.treed.posterior import AveragedTrees, TreedPosterior
 
 __all__ = ["TreedGaussianProcess", "least_leaf_width"]
 
-_REMEMBERED: Final = 4096  # leaves whose learning is kept
+_LEAVES: Final = 4096  # whose learning is kept
 
 
 class TreedGaussianProcess:
@@ -93,8 +94,8 @@ class TreedGaussianProcess:
         self._continued = continued
         self._seed = _count("seed", seed, 0)
         self._posterior: TreedPosterior | AveragedTrees | None = None
-        self._learnt: OrderedDict[bytes, GaussianProcessPosterior] = OrderedDict()
-        self._evidences: OrderedDict[bytes, float] = OrderedDict()
+        self._learnt = Remembered[GaussianProcessPosterior](_LEAVES)
+        self._evidences = Remembered[float](_LEAVES)
 
     def __repr__(self) -> str:
         return f"TreedGaussianProcess(min_leaf={self._min_leaf!r}, trees={self._trees}, process={self._process!r})"
@@ -170,12 +171,7 @@ class TreedGaussianProcess:
             scaled = self._process.centered(outputs, y[own])
             known = None if noise is None else noise[own]
             key = fingerprint(X[own], y[own], known, scaled, [len(own)])
-            if key not in self._evidences:
-                self._evidences[key] = self._process.log_evidence(X[own], y[own], scaled, known)
-            self._evidences.move_to_end(key)
-            total += self._evidences[key]
-        while len(self._evidences) > _REMEMBERED:
-            self._evidences.popitem(last=False)
+            total += self._evidences.value(key, partial(self._process.log_evidence, X[own], y[own], scaled, known))
         return total
 
     def _tree(
@@ -211,32 +207,23 @@ class TreedGaussianProcess:
         order = np.concatenate(blocks)
         own = y[blocks[0]]
         outputs = self._process.centered(outputs, own)
-        start = None
-        key = b""
-        if self._continued:
-            start = None if old is None else old.leaves[_nearest(partition, j, old)].hyperparameters.theta[-1]
-        else:
-            sizes = [len(block) for block in blocks]
-            key = fingerprint(X[order], y[order], noise if noise is None else noise[order], outputs, sizes)
-            if key in self._learnt:
-                self._learnt.move_to_end(key)
-                return self._learnt[key]
-            rng = np.random.default_rng([self._seed, *np.frombuffer(key[:16], dtype=np.uint32)])
-        leaf = self._process.condition_on_blocks(
+        sizes = [len(block) for block in blocks]
+        known = None if noise is None else noise[order]
+        learn = partial(
+            self._process.condition_on_blocks,
             X[order],
             y[order],
-            rng,
-            outputs,
-            sizes=[len(block) for block in blocks],
+            outputs=outputs,
+            sizes=sizes,
             weights=block_weights(len(blocks), self._weight_power),
-            start=start,
-            noise=None if noise is None else noise[order],
+            noise=known,
         )
-        if not self._continued:
-            self._learnt[key] = leaf
-            if len(self._learnt) > _REMEMBERED:
-                self._learnt.popitem(last=False)
-        return leaf
+        if self._continued:
+            start = None if old is None else old.leaves[_nearest(partition, j, old)].hyperparameters.theta[-1]
+            return learn(rng=rng, start=start)
+        key = fingerprint(X[order], y[order], known, outputs, sizes)
+        own_rng = np.random.default_rng([self._seed, *np.frombuffer(key[:16], dtype=np.uint32)])
+        return self._learnt.value(key, partial(learn, rng=own_rng))
 
     def fit(
         self, X: ArrayLike, y: ArrayLike, seed: int | None = None, *, noise: ArrayLike | None = None
