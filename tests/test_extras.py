@@ -67,6 +67,7 @@ def test_a_part_whose_extra_is_missing_names_the_command(extra):
         ("maximize rkhs", ["matplotlib"], "report"),
         ("campaign list", ["joblib"], "campaign"),
         ("study status nothing", ["optuna"], "study"),
+        ("explore bottle --trials 1", ["igl"], "mesh"),
     ],
 )
 def test_the_command_line_says_it_in_one_line(arguments, blocked, extra):
