@@ -36,9 +36,11 @@ def test_a_grasp_of_a_cloud(here, capsys):
     assert "lost to the unknown shape" in out
     result = json.loads((here / "out" / "result.json").read_text())
     assert result["settings"]["object"] == "bottle"
+    assert result["settings"]["quality"] == "epsilon"
     page = (here / "out" / "report.html").read_text()
     assert "surface, known" in page
     assert "surface, unknown" in page
+    assert "quality (epsilon) over 2 shapes, hit exactly" in page
 
 
 def test_touches_move_the_surface_of_a_cloud(here):

@@ -196,7 +196,7 @@ def grasp(
         describe=describe,
         also_write=also_write,
         units=dict(zip(problem.box.names, problem.units, strict=True)),
-        quality_name="held (physics)" if outcome == "held" else f"quality ({problem.simulator.quality})",
+        quality_name="held (physics)" if outcome == "held" else quality_name(problem),
         outcome="success" if outcome == "held" else "value",
         disturbance="the hand is off",
         success_above=0.0,
@@ -207,6 +207,12 @@ def grasp(
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)
+
+
+def quality_name(problem: Any) -> str:
+    """Return the name of what a trial gives."""
+    shapes = len(problem.object.draws) if problem.averaged else 0
+    return f"quality ({problem.simulator.quality})" + f" over {shapes} shapes" * bool(shapes)
 
 
 def advice_for(problem: Any) -> str:

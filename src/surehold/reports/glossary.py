@@ -73,6 +73,8 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
     if quality in _QUALITIES:
         words.append((f"quality ({quality})", _QUALITIES[quality]))
         words.append(("below 0", "The open hand overlapped the object there, so it could not close: deeper is lower."))
+    if report.quality_name.endswith(" shapes"):
+        words.append(("over shapes", "Mean over equally likely shapes, all of which agree with what was measured."))
     if contact == "graded":
         words.append(
             ("graded contacts", "A soft touch: a point counts more the nearer it is to the skin, up to 3 mm away.")
