@@ -1,8 +1,6 @@
-"""Speed and size in one table, beside what is asked for and the floor; compared with the last one and stored.
+"""Speed and size in one table, beside what is asked for and the floor; compared with the last one and stored."""
 
-python -m benchmarks [--quick]     --quick: without peers, services, clusters, and 3,000 trials and more
-"""
-
+import argparse
 import os
 import sys
 import tempfile
@@ -115,7 +113,11 @@ def studies(quick: bool) -> Iterator[Row]:
     yield Row("overhead of a run, Dask, 2 processes, 10,000 runs", overhead, 0.005)
 
 
-def main(quick: bool) -> None:
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    wanted = "without peers, services, clusters, and 3,000 trials and more"
+    parser.add_argument("--quick", action="store_true", help=wanted)
+    quick = parser.parse_args().quick
     before, rows = stored.last(), []
     load = os.getloadavg()[0]
     parts = [partial(part, quick) for part in (asks, grasps, grown, studies)]
@@ -132,4 +134,4 @@ def main(quick: bool) -> None:
 
 
 if __name__ == "__main__":
-    main("--quick" in sys.argv[1:])
+    main()
