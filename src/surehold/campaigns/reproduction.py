@@ -103,7 +103,9 @@ def _named(made: dict[tuple[str, str], int], n: int) -> str:
         problems.setdefault(tuple(some), []).append(problem)
     if list(made.values()).count(n) == len(made):
         return "all"
-    return ", ".join(f"{', '.join(some)} on {' and '.join(where)}" for some, where in problems.items())
+    every = len({problem for problem, _ in made})
+    on = {some: f" on {' and '.join(where)}" * (len(where) < every) for some, where in problems.items()}
+    return ", ".join(", ".join(some) + where for some, where in on.items())
 
 
 def main(arguments: list[str]) -> None:
