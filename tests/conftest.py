@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import tempfile
@@ -15,6 +16,8 @@ settings.register_profile("default", derandomize=True, deadline=None, database=N
 settings.register_profile(
     "explore", derandomize=False, deadline=None, max_examples=1000, suppress_health_check=[HealthCheck.too_slow]
 )
+# A test run that a script starts in the background ignores Ctrl-C, and so would all programs that tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ["SUREHOLD_WARM_UP"] = "0"  # no child processes but where a test asks for one
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 

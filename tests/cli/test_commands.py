@@ -155,15 +155,6 @@ def test_all_trials_failed(capsys):
     assert "no robot here" in error
 
 
-@pytest.fixture
-def interruptible():
-    """Python's own reaction to Ctrl-C, which a test run started in the background of a shell is started without."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.usefixtures("interruptible")
 def test_interrupt_keeps_what_was_done(here, capsys):
     assert surehold("maximize own.py:stopped --bounds a=0:1 --trials 30 --initial 6") == 0
     assert "Interrupted after 8 of 30 trials" in capsys.readouterr().out
@@ -203,13 +194,11 @@ def test_a_run_that_gave_nothing_leaves_no_empty_folder(here, capsys):
     capsys.readouterr()
 
 
-@pytest.mark.usefixtures("interruptible")
 def test_interrupt_before_anything(capsys):
     assert surehold("maximize own.py:stopped_at_once --bounds a=0:1") == 130
     assert "interrupted; what was finished before is kept" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("interruptible")
 def test_interrupt_while_writing_waits(here, capsys, monkeypatch):
     write_run = files.write_run
 
