@@ -37,7 +37,7 @@ def test_a_fingerprint_is_of_values_shape_noise_and_settings():
     assert fingerprint(np.asfortranarray(X), y.copy(), None) == same
     others = [
         fingerprint(X.reshape(2, 3), y, None),
-        fingerprint(X, y + 1e-16 + [0, 0, 1e-15], None),
+        fingerprint(X, np.nextafter(y, 9.0), None),
         fingerprint(X, y, y),
         fingerprint(X, y, None, 1),
     ]

@@ -14,9 +14,7 @@ __all__ = ["Remembered", "fingerprint", "learnt_from"]
 
 Value = TypeVar("Value")
 
-_FEW: Final = (
-    4  # sets of trials: asks between which little is told, and a copy of the optimizer that was told otherwise
-)
+_FEW: Final = 4  # sets of trials: those of an ask, of a surprise, and of the last asks before
 
 
 class Remembered(Generic[Value]):
