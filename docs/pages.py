@@ -91,7 +91,7 @@ def _speed() -> str:
     """Return the last table of `make bench`."""
     path = max(ROOT.glob("results/benchmarks/*.json"))
     stored = json.loads(path.read_text(encoding="utf-8"))
-    load = f"{stored['load']:.0f} processes wanted to run at its start"
+    load = f"the load at its start was {stored['load']:.1f}"
     text = SPEED.format(name=path.name, machine=stored["machine"], load=load, yardstick=1e3 * stored["yardstick"])
     lines = ["| | seconds | times asked | times the floor | MB |", "|---|---|---|---|---|"]
     for name, row in stored["rows"].items():

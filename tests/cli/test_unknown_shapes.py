@@ -1,6 +1,7 @@
 """`surehold grasp --cloud` and `surehold explore`: what a user types and gets."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -74,6 +75,19 @@ def test_an_exploration(here, capsys):
     assert "The grasp it ends with: palm at (" in page
     assert "What the touches taught" in page
     assert (here / "touched" / "shape.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_no_exploration_replaces_another_and_one_that_cannot_start_leaves_nothing(here, capsys, monkeypatch):
+    for _ in range(2):
+        assert surehold("explore bottle --trials 1") == 0
+    folders = ["explore-bottle-seed0", "explore-bottle-seed0-2"]
+    assert sorted(path.name for path in (here / "runs").iterdir()) == folders
+    first, second = (json.loads((here / "runs" / name / "explore.json").read_text()) for name in folders)
+    assert first["trials"] == second["trials"]
+    monkeypatch.setitem(sys.modules, "igl", None)
+    assert surehold("explore bottle --trials 1") == 2
+    assert "surehold[mesh]" in capsys.readouterr().err
+    assert len(list((here / "runs").iterdir())) == 2
 
 
 @pytest.mark.parametrize(

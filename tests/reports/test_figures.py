@@ -2,6 +2,7 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from surehold.reports import figures
 from surehold.reports.drawing import PALETTE, marked
@@ -124,3 +125,14 @@ def test_trials_that_did_not_succeed_are_crossed(gm_report):
     assert "did not succeed</li>" in render(counted)
     assert "failed trial</li>" in render(replace(gm_report, y=np.where(marks["trials-failed"], np.nan, gm_report.y)))
     assert "</span> failed trial</li>" not in render(gm_report)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.2, 0.3, 0.9])
+def test_the_name_of_the_initial_design_lies_in_the_figure(rkhs_report, share):
+    figure = figures.figures(replace(rkhs_report, n_initial=round(share * rkhs_report.y.size)))["trace"]
+    axes = figure.axes[0]
+    figure.draw_without_rendering()
+    (name,) = [text for text in axes.texts if text.get_text() == "initial design"]
+    box, frame = name.get_window_extent(), axes.get_window_extent()
+    assert frame.x0 <= box.x0
+    assert box.x1 <= frame.x1

@@ -45,9 +45,9 @@ def explore(
 ) -> None:
     """Touch an object whose shape is not known, learn it, and end with a grasp: in simulation, or with a robot."""
     from surehold.cli.compilation import announced
+    from surehold.cli.folders import folder_of
     from surehold.cli.terminal import terminal
     from surehold.problems.grasp.exploration import GOALS
-    from surehold.store.atomic import checked_folder
 
     if not 1 <= trials <= _MOST_TRIALS:
         raise InputError(f"--trials is {trials}; give 1 to {_MOST_TRIALS}.")
@@ -73,9 +73,9 @@ def explore(
     if not obj:
         raise InputError("no object is given; name one to touch in simulation, or a --study with --box or --cloud.")
     body = object_of(described, console)
-    folder = checked_folder(out or Path("runs") / f"explore-{body.name}-seed{seed}")
     with announced(console):
         run = _Run(described, body, start, goal, probe, input_noise, seed)
+    folder = folder_of(out, f"explore-{body.name}-seed{seed}")
     interrupted = False
     try:
         with shown_progress("touching", console) as progress:

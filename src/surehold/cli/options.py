@@ -40,9 +40,7 @@ Method = Annotated[str, typer.Option(help="ubo: knows the input noise; bo: plain
 Seed = Annotated[int, typer.Option(help="Same seed, same run.")]
 Out = Annotated[
     str,
-    typer.Option(
-        help="Folder for the results, written over; by default a new one, runs/NAME-METHOD-seedN.", show_default=False
-    ),
+    typer.Option(help="Folder for the results, written over; by default one of its own in runs/.", show_default=False),
 ]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser at the end.")]
 Surrogate = Annotated[

@@ -31,6 +31,7 @@ def scene(
 ) -> None:
     """Browse objects, facets and modes: the best of 45 grasps in each, as a page, JSON and a picture."""
     from surehold.cli.compilation import announced
+    from surehold.cli.folders import folder_of
     from surehold.cli.terminal import terminal
     from surehold.grasping.object.shipped import OBJECTS
     from surehold.grasping.pictures.scene import grasp_scene
@@ -42,7 +43,7 @@ def scene(
     from surehold.reports.run_report import Candidate
     from surehold.reports.scenes_page import render_scenes
     from surehold.reports.still import still_picture
-    from surehold.store.atomic import checked_folder, write_file
+    from surehold.store.atomic import write_file
 
     console = terminal()
     words = checked_words(options)
@@ -50,7 +51,7 @@ def scene(
     quick = words["hand"] == "icub-left" and not words["preshape"] and (not obj or obj in OBJECTS)
     if facet:
         _modes(facet)  # explains an unknown one at once
-    folder = checked_folder(out or Path("runs") / f"scene-{Path(obj).stem or 'objects'}")
+    folder = folder_of(out, f"scene-{Path(obj).stem or 'objects'}")
     views, notes, rows, data = [], [], [], []
     best = -np.inf
     picture = None

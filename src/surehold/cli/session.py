@@ -1,7 +1,6 @@
 """One run from the command line: progress while it goes, re-queries, the files, and the table at the end."""
 
 import os
-import re
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping
@@ -16,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from surehold.cli.compilation import announced, warm_up
+from surehold.cli.folders import folder_of
 from surehold.cli.interruption import terminable, undisturbed
 from surehold.cli.options import METHODS
 from surehold.cli.terminal import terminal
@@ -27,7 +27,7 @@ from surehold.problems.problem import Problem
 from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.verdict import number, verdict
-from surehold.store.atomic import checked_folder, new_folder
+from surehold.store.atomic import checked_folder
 
 __all__ = ["NO_SUCCESS", "Kept", "folder_for", "run_session"]
 
@@ -53,18 +53,12 @@ class Kept:
 
 
 def folder_for(name: str, method: str, seed: int, out: str, study: str = "") -> Path:
-    """Return the folder for a run's files, created and writable: `out`, runs/STUDY, or a new one in runs/.
-
-    A new one is called NAME-METHOD-seedN, with -2, -3, ... behind it where that is taken: no run replaces another.
-    """
+    """Return the folder for a run's files, created and writable: `out`, runs/STUDY, or a new one in runs/."""
     if study and not out:
         from surehold.studies.storage import checked_name
 
         return checked_folder(Path("runs") / checked_name(study))
-    if out:
-        return checked_folder(out)
-    slug = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower()[:100] or "run"
-    return new_folder(Path("runs") / f"{slug}-{method}-seed{seed}")
+    return folder_of(out, f"{name[:100]}-{method}-seed{seed}")
 
 
 def run_session(

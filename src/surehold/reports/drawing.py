@@ -250,13 +250,14 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
         )
     if 0 < report.n_initial < report.y.size:
         axes.axvspan(-0.5, report.n_initial - 0.5, color=PALETTE["grid"], alpha=0.45, linewidth=0, zorder=0)
+        wide = report.n_initial > 0.25 * report.y.size  # the words fit into the band; else they begin in it
         axes.annotate(
             "initial design",
-            (report.n_initial / 2 - 0.5, 1.0),
+            (report.n_initial / 2 - 0.5 if wide else -0.5, 1.0),
             xycoords=("data", "axes fraction"),
-            xytext=(0, -3),
+            xytext=(0 if wide else 3, -3),
             textcoords="offset points",
-            ha="center",
+            ha="center" if wide else "left",
             va="top",
             fontsize=8.5,
             color=PALETTE["muted"],
