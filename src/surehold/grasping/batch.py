@@ -1,11 +1,15 @@
-"""Many trials at once, on several processes.
+"""Many trials at once, on several cores.
 
 A trial depends on its pose and posture alone, therefore the result is the same, bit for bit, whatever the number of
 workers. What comes back are numbers; `Simulator.grasp` gives the contacts of a trial that deserves a second look.
+
+Epsilon of round cones, the default, is measured in compiled code that lets other threads run: workers are threads, and
+nothing is sent. The other measures are Python's, which runs in one thread at a time: workers are processes.
 """
 
 import pickle
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
@@ -14,12 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
 from surehold.grasping.grasp import STATUSES
+from surehold.grasping.hand.synergy import preshape_of
 from surehold.grasping.poses import Pose
 from surehold.grasping.simulator import Simulator
+from surehold.grasping.trial_loop import UNDECIDED, run_trials
+from surehold.grasping.wrench.ellipsoids import RoundCones
 
 __all__ = ["GraspBatch", "grasp_batch"]
 
-_CHUNK = 100  # trials that a worker takes at a time, at most: a fifth of a second
+_CHUNK = 100  # trials that a worker takes at a time, at most: a tenth of a second
 _IDLE = 300  # seconds after which workers that have nothing to do end
 
 
@@ -41,7 +48,9 @@ class GraspBatch:
         return {name: float(np.mean(self.status == k)) if len(self) else 0.0 for k, name in enumerate(STATUSES)}
 
 
-def grasp_batch(simulator: Simulator, poses: Sequence[Pose], s1: ArrayLike = 0.0, workers: int = 1) -> GraspBatch:
+def grasp_batch(
+    simulator: Simulator, poses: Sequence[Pose] | NDArray[np.float64], s1: ArrayLike = 0.0, workers: int = 1
+) -> GraspBatch:
     """Try many grasps.
 
     Parameters
@@ -49,11 +58,12 @@ def grasp_batch(simulator: Simulator, poses: Sequence[Pose], s1: ArrayLike = 0.0
     simulator
         Hand, object and measure.
     poses
-        Poses of the palm in the world, n of them.
+        Poses of the palm in the world, n of them, or their matrices (n, 3, 4).
     s1
         Posture of each [rad], (n,), or one for all; of a preshape with k amplitudes, (n, k).
     workers
-        Number of processes; they start in about a second and stay for the next call.
+        Number of threads; for other measures than epsilon of round cones of processes, which start in about a second
+        and stay for the next call.
 
     Raises
     ------
@@ -68,18 +78,13 @@ def grasp_batch(simulator: Simulator, poses: Sequence[Pose], s1: ArrayLike = 0.0
     postures = postures if postures.ndim else np.broadcast_to(postures, len(poses))
     chunk = max(1, min(_CHUNK, len(poses) // (4 * workers)))
     parts = [slice(start, start + chunk) for start in range(0, len(poses), chunk)]
-    if workers == 1 or len(parts) < 2:
-        rows = [_outcomes(simulator, poses[part], postures[part]) for part in parts]
+    cones = simulator.measure.round_cones()
+    if cones is not None:
+        table = _compiled_outcomes(simulator, poses, postures, cones, parts, workers)
+    elif workers == 1 or len(parts) < 2:
+        table = _outcomes(simulator, poses, postures)
     else:
-        from joblib.externals.loky import get_reusable_executor
-
-        simulator.warm_up()  # compiled once, read from the cache by the workers
-        content = pickle.dumps(simulator)
-        pool = get_reusable_executor(int(workers), timeout=_IDLE, env={"OPENBLAS_NUM_THREADS": "1"})
-        rows = list(
-            pool.map(partial(_outcomes_there, content), [(poses[part], postures[part].copy()) for part in parts])
-        )
-    table = np.concatenate([np.empty((0, 5)), *rows])  # type: ignore[list-item]
+        table = _outcomes_in_processes(simulator, poses, postures, parts, workers)
     quality, status, penetration, contacts, fallbacks = table.T
     return GraspBatch(
         quality.copy(),
@@ -90,21 +95,92 @@ def grasp_batch(simulator: Simulator, poses: Sequence[Pose], s1: ArrayLike = 0.0
     )
 
 
+def _compiled_outcomes(
+    simulator: Simulator,
+    poses: Sequence[Pose] | NDArray[np.float64],
+    postures: NDArray[np.float64],
+    cones: RoundCones,
+    parts: list[slice],
+    workers: int,
+) -> NDArray[np.float64]:
+    """Return (n, 5) as `_outcomes` does, from the compiled loop in threads."""
+    matrices = np.empty((len(poses), 3, 4))
+    for matrix, pose in zip(matrices, poses, strict=True):
+        matrix[:] = pose.matrix if isinstance(pose, Pose) else pose
+    if not (np.isfinite(matrices).all() and np.isfinite(postures).all()):
+        raise InputError("a pose or posture of the batch is not finite; give finite numbers.")
+    chosen = preshape_of(simulator.hand, simulator.preshape)
+    first, *others = postures.T if postures.ndim > 1 else (postures,)
+    starts = chosen.start + first[:, None, None] * chosen.posture
+    for amplitudes, component in zip(others, chosen.further, strict=True):
+        starts += amplitudes[:, None, None] * component
+    table = np.empty((len(poses), 6))
+
+    def run(part: slice) -> None:
+        run_trials(
+            simulator.field.nodes,
+            simulator.field.frame,
+            simulator.arrays,
+            simulator.to_object,
+            matrices[part],
+            starts[part],
+            simulator.model,
+            simulator.closing == "adaptive",
+            simulator.depth,
+            cones,
+            table[part],
+        )
+
+    if workers == 1 or len(parts) < 2:
+        run(slice(None))
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(run, parts))
+    quality, status, penetration, deep, contacts, fallbacks = table.T
+    for i in np.flatnonzero(penetration > 0.0):
+        quality[i] = simulator.collision_worth(float(deep[i]))
+    outcomes = np.column_stack([quality, status, penetration, contacts, fallbacks])
+    for i in np.flatnonzero(status == UNDECIDED).tolist():
+        outcomes[i] = _outcomes(simulator, poses[i : i + 1], postures[i : i + 1])
+    return outcomes
+
+
+def _outcomes_in_processes(
+    simulator: Simulator,
+    poses: Sequence[Pose] | NDArray[np.float64],
+    postures: NDArray[np.float64],
+    parts: list[slice],
+    workers: int,
+) -> NDArray[np.float64]:
+    from joblib.externals.loky import get_reusable_executor
+
+    simulator.warm_up()  # compiled once, read from the cache by the workers
+    content = pickle.dumps(simulator)
+    pool = get_reusable_executor(int(workers), timeout=_IDLE, env={"OPENBLAS_NUM_THREADS": "1"})
+    chunks = [(poses[part], postures[part].copy()) for part in parts]
+    return np.concatenate(list(pool.map(partial(_outcomes_there, content), chunks)))
+
+
 @lru_cache(maxsize=2)
 def _simulator(content: bytes) -> Simulator:
     """Return the simulator in a worker process: to make it takes as long as dozens of trials."""
     return pickle.loads(content)
 
 
-def _outcomes_there(content: bytes, part: tuple[Sequence[Pose], NDArray[np.float64]]) -> NDArray[np.float64]:
+def _outcomes_there(
+    content: bytes, part: tuple[Sequence[Pose] | NDArray[np.float64], NDArray[np.float64]]
+) -> NDArray[np.float64]:
     return _outcomes(_simulator(content), *part)
 
 
-def _outcomes(simulator: Simulator, poses: Sequence[Pose], postures: NDArray[np.float64]) -> NDArray[np.float64]:
+def _outcomes(
+    simulator: Simulator, poses: Sequence[Pose] | NDArray[np.float64], postures: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return (n, 5): quality, status, penetration, contacts, fallbacks."""
     rows = np.empty((len(poses), 5))
     for row, pose, s1 in zip(rows, poses, postures, strict=True):
-        grasp = simulator.grasp(pose, tuple(s1.tolist()) if np.ndim(s1) else float(s1))
+        there = pose if isinstance(pose, Pose) else Pose.from_matrix(pose)
+        grasp = simulator.grasp(there, tuple(s1.tolist()) if np.ndim(s1) else float(s1))
         fallbacks = 0 if grasp.wrench is None else grasp.wrench.fallbacks
         row[:] = grasp.quality, STATUSES.index(grasp.status), grasp.penetration, len(grasp.contacts), fallbacks
     return rows

@@ -113,41 +113,36 @@ def disturbed_poses(
     n: int = 100,
     seed: int = 0,
     disturbed: Literal["hand", "object"] = "hand",
-) -> list[Pose]:
-    """Return the n poses of the palm that `robust_quality` tries, in the world and relative to the object as it stands.
+) -> Array:
+    """Return the poses (n, 3, 4) of the palm that `robust_quality` tries, in the world, with the object as it stands.
 
     A disturbance of the object is undone on the hand: only where they are to each other matters.
     """
+    from scipy.spatial.transform import Rotation
     from scipy.special import ndtr, ndtri
 
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= _MOST:
         raise InputError(f"number of disturbed trials is {n!r}; give an integer of 1 to {_MOST:,}.")
     if disturbed not in DISTURBED:
         raise unknown_name("disturbed body", disturbed, DISTURBED)
+    if not pose.is_finite:
+        raise InputError(f"pose {pose} is not finite; give finite numbers.")
     bounds = noise or PoseNoise()
     if not all(np.isfinite(b) and b >= 0.0 for b in bounds):
         raise InputError(f"pose noise is {bounds}; give bounds of 0 or more, in meters and radians.")
     share = np.random.default_rng(seed).random((int(n), 6))
     low = ndtr(-_TRUNCATION)
     draws = ndtri(low + share * (1.0 - 2.0 * low)) / _TRUNCATION  # in [-1, 1]
+    shifts, turns = bounds.shift * draws[:, :3], bounds.turn * draws[:, 3:]
+    turned = Rotation.from_euler("XYZ", turns).as_matrix()
+    r, p = pose.rotation, np.asarray(pose.position)
     center = np.asarray(simulator.hand.grasp_center)
-    poses = []
-    for draw in draws:
-        shift, turn = bounds.shift * draw[:3], bounds.turn * draw[3:]
-        if disturbed == "hand":
-            poses.append(pose @ _about(center, shift, turn))
-        else:
-            poses.append(_about(pose.apply(center), shift, turn).inverse() @ pose)
-    return poses
-
-
-def _about(center: Array, shift: Array, turn: Array) -> Pose:
-    """Return the motion D."""
-    rotation = np.eye(3)
-    for axis, angle in enumerate(turn):
-        c, s = np.cos(angle), np.sin(angle)
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        step = np.eye(3)
-        step[i, i], step[j, j], step[i, j], step[j, i] = c, c, -s, s
-        rotation = rotation @ step
-    return Pose.from_matrix(np.column_stack([rotation, center - rotation @ center + shift]))
+    if disturbed == "hand":
+        rotations = r @ turned
+        positions = p + (center + shifts - turned @ center) @ r.T
+    else:
+        center = p + r @ center
+        back = np.swapaxes(turned, 1, 2)
+        rotations = back @ r
+        positions = center + np.einsum("nij,nj->ni", back, p - center - shifts)
+    return np.concatenate([rotations, positions[:, :, None]], axis=2)

@@ -11,7 +11,7 @@ grasp center, R = R_default Rx Ry Rz.
 """
 
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, sqrt
 from typing import Final
 
 import numpy as np
@@ -71,7 +71,11 @@ class Pose:
     @property
     def rotation(self) -> Array:
         """R (3, 3)."""
-        w, x, y, z = np.asarray(self.quaternion) / np.linalg.norm(self.quaternion)
+        w, x, y, z = map(float, self.quaternion)
+        length = sqrt(w * w + x * x + y * y + z * z)
+        if not length > 0.0:
+            return np.full((3, 3), np.nan)
+        w, x, y, z = w / length, x / length, y / length, z / length
         return np.array(
             [
                 [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

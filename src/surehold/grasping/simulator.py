@@ -1,29 +1,18 @@
 """One trial: put the open hand at a pose, close it, find the contacts, measure how well they hold the object."""
 
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.choices import CLOSING_MODES, COLLISIONS, CONTACT_MODELS
-from surehold.grasping.closing.closing import Closed, close_hand, hand_gaps
-from surehold.grasping.closing.contacts import (
-    DEPTH,
-    SKIN,
-    Contacts,
-    as_contacts,
-    blended,
-    pass_share,
-    skin_contacts,
-    touch_contacts,
-)
+from surehold.grasping.closing.attempt import Attempt, HandArrays, attempt, felt, hand_arrays, open_gaps, times
+from surehold.grasping.closing.contacts import DEPTH, GRADED, Contacts, as_contacts
 from surehold.grasping.grasp import Grasp, Status
-from surehold.grasping.hand.kinematics import link_ends, link_frames
-from surehold.grasping.hand.model import CLOSED, Hand
+from surehold.grasping.hand.model import Hand
 from surehold.grasping.hand.named import hand_named
-from surehold.grasping.hand.skin import skin_samples
-from surehold.grasping.hand.synergy import ClosingMotion, closing_motion, preshape_of
+from surehold.grasping.hand.synergy import closing_motion, preshape_of
 from surehold.grasping.object.distance_field import MARGIN, DistanceField, distance_field_of
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.shipped import shipped_object
@@ -37,15 +26,6 @@ Array = NDArray[np.float64]
 
 _PENALTY: Final = 0.05  # at the deepest penetration: half of a good epsilon
 _PENALTY_DEPTH: Final = 0.02  # depths of all bodies together at which the penalty is 63 % of that [m]
-_LEAST_SHARE: Final = 1e-3  # outcomes of a smaller share are not looked at
-
-
-class _Geometry(NamedTuple):
-    """The hand in the object's frame, as the compiled functions take it."""
-
-    bases: Array  # (f, 3, 4)
-    palm: Array  # (3, 4) palm frame
-    palms: Array  # (p, 3, 4) frames of the palm's boxes
 
 
 class Simulator:
@@ -130,7 +110,7 @@ class Simulator:
         self.contact: Final = contact
         self.quality: Final = quality
         self.closing: Final = closing
-        preshape_of(self.hand, preshape)
+        rates = preshape_of(self.hand, preshape).rate
         self.preshape: Final = preshape or next(iter(self.hand.preshapes))
         self.collision: Final = collision
         own = self.object.friction if self.hand.friction is None else self.hand.friction
@@ -145,9 +125,10 @@ class Simulator:
         if not self.object_pose.is_finite:
             raise InputError(f"object_pose {object_pose} is not finite; give finite numbers.")
         self._to_object: Final[Pose] = self.object_pose.inverse()
+        self.to_object: Final[Array] = self._to_object.matrix  #: (3, 4) from the world to the object's frame
         self.field: Final[DistanceField] = self._field()
-        self._reach: Final[Array] = self.hand.reach()
-        self._samples: Final[Array] = skin_samples(self.hand)
+        self.arrays: Final[HandArrays] = hand_arrays(self.hand, rates)  #: the hand for compiled functions
+        self.model: Final[int] = CONTACT_MODELS.index(contact)  #: the contact model for compiled functions
         self._no_contacts: Final = as_contacts(np.empty((0, 8)), self.hand)
 
     def grasp(self, pose: Pose, s1: float | tuple[float, ...] = 0.0) -> Grasp:
@@ -162,27 +143,24 @@ class Simulator:
         """
         if not (np.all(np.isfinite(s1)) and pose.is_finite):
             raise InputError(f"pose {pose} with s1 = {s1!r} is not finite; give finite numbers.")
-        relative = self._to_object @ pose
-        motion = closing_motion(self.hand, s1 if isinstance(s1, tuple) else float(s1), self.preshape)
-        geometry = self._place(relative)
-        opened = motion.joints(0.0)
-        depths = np.maximum(-self.gaps(relative, opened, geometry), 0.0)
-        penetration = float(depths.max())
-        if penetration > 0.0:
-            worth = self._collision(float(depths.sum()))
-            return Grasp("initial collision", worth, relative, s1, opened, opened, self._no_contacts, (), penetration)
-        closed = self._close(geometry, motion)
-        contacts = self._contacts(geometry, motion, closed)
-        touched = np.flatnonzero(closed.touched).tolist()
+        relative = self._to_object @ pose if self.object_pose != Pose() else pose
+        start = self.motion_start(s1)
+        opened = np.clip(start, self.hand.lower, self.hand.upper)
+        tried = self.attempt(pose, start)
+        if tried.deepest > 0.0:
+            worth = self.collision_worth(tried.deep)
+            return Grasp("initial collision", worth, relative, s1, opened, opened, self._no_contacts, (), tried.deepest)
+        contacts = as_contacts(tried.rows, self.hand)
+        touched = np.flatnonzero(tried.touched).tolist()
         touching = tuple(dict.fromkeys(map(self.hand.body_names.__getitem__, touched)))
         if len(contacts) < 2:
-            gaps = self.gaps(relative, closed.joints, geometry)[:-1].reshape(self.hand.radii.shape)
+            gaps = self.gaps(relative, tried.joints)[:-1].reshape(self.hand.radii.shape)
             worth = self.measure.without_contacts(gaps)
-            return Grasp("no contact", worth, relative, s1, closed.joints, opened, contacts, touching, 0.0)
+            return Grasp("no contact", worth, relative, s1, tried.joints, opened, contacts, touching, 0.0)
         wrench = self.measure.wrench(contacts.points, contacts.normals, contacts.weights)
         status: Status = "ok" if wrench.force_closure else "not closed"
         worth = float(self.measure.value(contacts.points, contacts.normals, wrench))
-        return Grasp(status, worth, relative, s1, closed.joints, opened, contacts, touching, 0.0, wrench)
+        return Grasp(status, worth, relative, s1, tried.joints, opened, contacts, touching, 0.0, wrench)
 
     def quality_at(self, pose: Pose, joints: ArrayLike) -> float:
         """Return the quality of the skin's contacts of the hand as it stands, without closing it.
@@ -197,10 +175,21 @@ class Simulator:
 
     def contacts_at(self, pose: Pose, joints: ArrayLike) -> Contacts:
         """Return the skin's contacts of the hand as it stands, see `quality_at`."""
-        angles = np.ascontiguousarray(joints, dtype=np.float64)
-        return as_contacts(self._skin(self._place(pose), angles), self.hand)
+        angles = np.array(joints, dtype=np.float64, order="C")
+        rows = felt(
+            self.field.nodes,
+            self.field.frame,
+            self.arrays,
+            pose.matrix,
+            angles,
+            self.depth,
+            self.model == GRADED,
+            0,
+            self.hand.palm + 1,
+        )
+        return as_contacts(rows, self.hand)
 
-    def gaps(self, pose: Pose, joints: ArrayLike, geometry: _Geometry | None = None) -> Array:
+    def gaps(self, pose: Pose, joints: ArrayLike) -> Array:
         """Return the gaps (f j + 1,) between the object and the hand's bodies at rest [m], the palm last.
 
         Negative values are rough depths; gaps above 5 mm are lower bounds.
@@ -212,33 +201,39 @@ class Simulator:
         joints
             Joint angles or shifts, (f, j) [rad or m].
         """
-        placed = self._place(pose) if geometry is None else geometry
-        angles = np.ascontiguousarray(joints, dtype=np.float64)
-        ends = link_ends(placed.bases, self.hand.chains, angles)
-        return hand_gaps(
-            self.field.nodes,
-            self.field.frame,
-            ends,
-            self.hand.radii,
-            placed.palms,
-            self.hand.palm_half_extents,
-            self.hand.palm_roundings,
-            0.005,
-        )
+        angles = np.array(joints, dtype=np.float64, order="C")
+        return open_gaps(self.field.nodes, self.field.frame, self.arrays, pose.matrix, angles)
 
     def warm_up(self) -> None:
         """Compile what a trial needs, if it is not yet in the cache: some seconds once for an installation."""
         half = self.object.box_half_extents
         beside = Pose((float(-self.hand.grasp_center[0]), 0.0, float(self.object.box_center[2] - half[2] - 0.05)))
-        motion = closing_motion(self.hand, 0.0, self.preshape)
-        geometry = self._place(beside)
-        closed = self._close(geometry, motion)
-        self.gaps(beside, closed.joints, geometry)
-        closed.touched[np.argmax(self.hand.radii)] = True  # a link that every hand has
-        self._skin(geometry, closed.joints)
-        self._touch(geometry, closed)
+        tried = self.attempt(beside, self.motion_start(0.0))
+        self.gaps(beside, tried.joints)
+        self.contacts_at(beside, tried.joints)
         points = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
         self.measure.wrench(points, -points, np.ones(4))
+
+    def attempt(self, pose: Pose, start: Array) -> Attempt:
+        """Close the hand at a pose of its palm in the world, from a motion's start (f, j); see `grasp`."""
+        return attempt(
+            self.field.nodes,
+            self.field.frame,
+            self.arrays,
+            times(self.to_object, pose.matrix),
+            start,
+            self.model,
+            self.closing == "adaptive",
+            self.depth,
+        )
+
+    def motion_start(self, s1: float | tuple[float, ...]) -> Array:
+        """Return where the closing motion begins with a posture, before clamping, (f, j) [rad or m]."""
+        return closing_motion(self.hand, s1 if isinstance(s1, tuple) else float(s1), self.preshape).start
+
+    def collision_worth(self, depth: float) -> float:
+        """Return the worth of an open hand whose bodies are inside the object by `depth` together [m]."""
+        return float(_PENALTY * np.expm1(-depth / _PENALTY_DEPTH)) if self.collision == "penalty" else 0.0
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "field"}
@@ -251,91 +246,3 @@ class Simulator:
     def _field(self) -> DistanceField:
         needed = float(self.hand.radii.max()) + self.depth + 0.001  # a link is felt from its axis
         return distance_field_of(self.object, margin=max(MARGIN, np.ceil(1e3 * needed) * 1e-3))
-
-    def _collision(self, depth: float) -> float:
-        """Return the worth of an open hand whose bodies are inside the object by `depth` together [m]."""
-        return _PENALTY * np.expm1(-depth / _PENALTY_DEPTH) if self.collision == "penalty" else 0.0
-
-    def _place(self, pose: Pose) -> _Geometry:
-        r, p = pose.rotation, np.asarray(pose.position)
-        bases = np.concatenate(
-            [r @ self.hand.bases[:, :, :3], (self.hand.bases[:, :, 3] @ r.T + p)[:, :, None]], axis=2
-        )
-        palms = np.concatenate(
-            [r @ self.hand.palm_poses[:, :, :3], (self.hand.palm_poses[:, :, 3] @ r.T + p)[:, :, None]], axis=2
-        )
-        return _Geometry(np.ascontiguousarray(bases), np.column_stack([r, p]), np.ascontiguousarray(palms))
-
-    def _close(self, geometry: _Geometry, motion: ClosingMotion, stop: Array | None = None) -> Closed:
-        return Closed(
-            *close_hand(
-                self.field.nodes,
-                self.field.frame,
-                geometry.bases,
-                self.hand.chains,
-                self._reach,
-                np.stack(motion),
-                self.hand.radii,
-                geometry.palms,
-                self.hand.palm_half_extents,
-                self.hand.palm_roundings,
-                self.hand.neighbors,
-                self.closing == "adaptive",
-                CLOSED,
-                self.depth if self.contact == "graded" else 0.0,
-                np.full(self.hand.radii.shape, np.inf) if stop is None else stop,
-            )
-        )
-
-    def _contacts(self, geometry: _Geometry, motion: ClosingMotion, closed: Closed) -> Contacts:
-        if self.contact == "single":
-            return as_contacts(self._touch(geometry, closed), self.hand)
-        rows = self._skin(geometry, closed.joints)
-        if self.contact == "graded":
-            bodies = self._samples[:, 0]
-            joints = self.hand.radii.shape[1]
-            for f in range(len(self.hand.radii)):
-                branches = self._branches(geometry, motion, closed, f, 0.0)
-                if len(branches) > 1:
-                    mine = (bodies >= joints * f) & (bodies < joints * (f + 1))
-                    rows[mine] = blended([(share, self._skin(geometry, angles)[mine]) for share, angles in branches])
-        return as_contacts(rows, self.hand)
-
-    def _branches(
-        self, geometry: _Geometry, motion: ClosingMotion, closed: Closed, finger: int, after: float
-    ) -> list[tuple[float, Array]]:
-        """Return share and joint angles of each outcome of a finger: held where a link brushes past, or gone on."""
-        branches: list[tuple[float, Array]] = []
-        left = 1.0
-        per_finger = self.hand.radii.shape[1]
-        links = range(per_finger * finger, per_finger * (finger + 1))
-        for time, link in sorted(
-            (float(closed.pass_time[b]), b) for b in links if after < closed.pass_time[b] < CLOSED
-        ):
-            share = left * pass_share(float(closed.pass_gap[link]), float(closed.pass_leave[link]), self.depth)
-            if share < _LEAST_SHARE:
-                continue
-            stop = np.full(self.hand.radii.shape, np.inf)
-            stop[finger, : (link % per_finger + 1 if self.closing == "adaptive" else per_finger)] = time
-            held = self._close(geometry, motion, stop)
-            branches += [(share * s, joints) for s, joints in self._branches(geometry, motion, held, finger, time)]
-            left -= share
-        return [*branches, (left, closed.joints)]
-
-    def _touch(self, geometry: _Geometry, closed: Closed) -> Array:
-        ends = link_ends(geometry.bases, self.hand.chains, closed.joints)
-        return touch_contacts(self.field.nodes, self.field.frame, ends, closed.touched, self.hand.radii)
-
-    def _skin(self, geometry: _Geometry, joints: Array) -> Array:
-        return skin_contacts(
-            self.field.nodes,
-            self.field.frame,
-            link_frames(geometry.bases, self.hand.chains, joints),
-            self.hand.chains,
-            self.hand.radii,
-            geometry.palm,
-            self._samples,
-            self.depth,
-            SKIN,
-            self.contact == "graded",
-        )

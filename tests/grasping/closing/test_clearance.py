@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from exact_mesh import ExactMesh, capsule_pair
 
-from surehold.grasping.closing.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap
+from surehold.grasping.closing.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap, separation
 from surehold.grasping.object.distance_field import distance_field_of
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.object.solids import RoundedBox, signed_distance
@@ -69,20 +69,27 @@ def test_palm_gap_equals_the_exact_mesh_distance(scene):
 
 
 def test_pair_gap_equals_an_independent_library():
-    rng = np.random.default_rng(4)
+    rng, across = np.random.default_rng(4), np.empty(3)
     for _ in range(300):
         a, b = rng.uniform(-0.05, 0.05, (2, 2, 3))
-        gap = capsule_pair_gap(a[0], a[1], b[0], b[1], 0.013)
+        gap = capsule_pair_gap(a[0], a[1], b[0], b[1], 0.013, across)
         if gap > 1e-4:
             assert gap == pytest.approx(capsule_pair(a, b, 0.0065), abs=1e-6)
+        assert separation(a[0], a[1], b[0], b[1], across) == pytest.approx(gap + 0.013, abs=1e-12)
+        assert np.linalg.norm(across) == pytest.approx(1.0)
+        other = rng.standard_normal(3)
+        other /= np.linalg.norm(other)
+        assert separation(a[0], a[1], b[0], b[1], other) <= gap + 0.013 + 1e-12, "no direction parts them farther"
 
 
 def test_pair_gap_of_parallel_and_touching_capsules():
-    a = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]])
+    a, across = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]]), np.empty(3)
     for shift, expected in ((0.0, 0.02), (0.01, 0.02), (-0.01, 0.02), (0.05, np.hypot(0.03, 0.02)), (-0.05, None)):
         b = a + np.array([shift, 0.02, 0.0])
-        gap = capsule_pair_gap(a[0], a[1], b[0], b[1], 0.0)
+        gap = capsule_pair_gap(a[0], a[1], b[0], b[1], 0.0, across)
         assert gap == pytest.approx(np.hypot(0.03, 0.02) if expected is None else expected, abs=1e-12)
+    capsule_pair_gap(a[0], a[1], a[0], a[1], 0.0, across)
+    np.testing.assert_array_equal(across, 0.0)
 
 
 def test_gap_to_the_palm_equals_a_dense_search():

@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from surehold.grasping.closing.contacts import DEPTH, blended, pass_share
+from surehold.grasping.closing.contacts import DEPTH, add_outcome, end_mixture, pass_share
 from surehold.grasping.object.solids import signed_distance
 from surehold.grasping.poses import default_pose
 from surehold.grasping.simulator import Simulator
@@ -124,10 +124,19 @@ def test_the_share_of_a_pass():
 def test_blending_is_the_mean_force_at_the_mean_place():
     a = np.array([[0.0, 0, 0, 1, 0, 0, 1.0, 3], [0, 0, 0, 0, 0, 0, 0, 3], [1, 0, 0, 1, 0, 0, 0.5, 3]])
     b = np.array([[0.0, 1, 0, 0, 1, 0, 1.0, 3], [0, 1, 0, 0, 1, 0, 0.8, 3], [1, 0, 0, -1, 0, 0, 0.5, 3]])
-    mixed = blended([(0.5, a), (0.5, b)])
+    mixed = mixture((0.5, a), (0.5, b))
     np.testing.assert_allclose(mixed[0], [0, 0.5, 0, np.sqrt(0.5), np.sqrt(0.5), 0, np.sqrt(0.5), 3])
     np.testing.assert_allclose(mixed[1], [0, 1, 0, 0, 1, 0, 0.4, 3])
     assert mixed[2, 6] == 0.0
     np.testing.assert_allclose(
-        blended([(1.0, a), (0.0, b)]), a * (a[:, 6:7] > 0.0) + [[0] * 7 + [3]] * (a[:, 6:7] == 0.0)
+        mixture((1.0, a), (0.0, b)), a * (a[:, 6:7] > 0.0) + [[0] * 7 + [3]] * (a[:, 6:7] == 0.0)
     )
+    np.testing.assert_array_equal(mixture((0.5, a), (0.5, b), first=4), a)
+
+
+def mixture(*outcomes, first=3):
+    total, rows = np.zeros((3, 8)), outcomes[0][1].copy()
+    for share, contacts in outcomes:
+        add_outcome(total, contacts, share, first, 9)
+    end_mixture(total, rows, first, 9)
+    return rows

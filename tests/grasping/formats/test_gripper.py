@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
 from surehold.grasping import Pose, Simulator, icub_left_hand
+from surehold.grasping.closing.attempt import placed as moved_frames
 from surehold.grasping.formats import GraspFile, read_grasps
 from surehold.grasping.formats.gripper import (
     closing_hand,
@@ -79,7 +80,7 @@ def test_frames_and_joints_are_those_of_the_model(hand, tmp_path):
     turned = root.rotation @ data.body("palm").xmat.reshape(3, 3)
     np.testing.assert_allclose(file.grasps[0].pose.rotation, turned, atol=1e-12)
     # the fingers in the simulator are where MuJoCo has them
-    frames = simulator._place(grasp.pose).bases
+    frames = moved_frames(grasp.pose.matrix, simulator.arrays.bases)
     for f, name in enumerate(("l", "r")):
         along = frames[f, :, 2] * grasp.joints[f, 0]
         np.testing.assert_allclose(frames[f, :, 3] + along, placed[name], atol=1e-12)

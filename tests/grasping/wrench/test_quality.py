@@ -62,7 +62,7 @@ def test_epsilon_lies_between_its_certified_bounds_and_rounds_up_the_polyhedral_
     _, exact = held()
     _, coarse = held(cones="polyhedral")
     _, fine = held(cones="polyhedral", edges=64)
-    assert exact.wrench.lower == exact.quality <= exact.wrench.upper
+    assert exact.wrench.lower <= exact.quality == exact.wrench.upper
     assert coarse.quality < fine.quality <= exact.wrench.upper + 1e-9
     assert fine.quality == pytest.approx(exact.quality, rel=0.005)
 

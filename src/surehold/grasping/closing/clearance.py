@@ -14,7 +14,7 @@ import numpy as np
 from surehold.grasping.object.distance_field import field_distance
 from surehold.store.kernels import njit
 
-__all__ = ["box_gap", "capsule_gap", "capsule_pair_gap", "palm_gap"]
+__all__ = ["box_gap", "capsule_gap", "capsule_pair_gap", "palm_gap", "separation"]
 
 _DEPTH = 64  # more than the halvings of 0.1 m that anyone can ask for, and the siblings that wait meanwhile
 
@@ -71,8 +71,11 @@ def capsule_gap(nodes, frame, near, far, radius, tolerance, slack):
 
 
 @njit(cache=True)
-def capsule_pair_gap(p, q, u, v, radii):
-    """Return the gap between capsules of axes p-q and u-v whose radii sum to `radii` [m] (Lumelsky 1985)."""
+def capsule_pair_gap(p, q, u, v, radii, across):
+    """Return the gap between capsules of axes p-q and u-v whose radii sum to `radii` [m] (Lumelsky 1985).
+
+    The unit vector from the point of p-q that is nearest to that of u-v is written to `across` (3,): 0 if they meet.
+    """
     aa, bb, ab, ac, bc = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         a, b, c = q[i] - p[i], v[i] - u[i], u[i] - p[i]
@@ -94,9 +97,24 @@ def capsule_pair_gap(p, q, u, v, radii):
         s = min(max((ac + ab) / aa, 0.0), 1.0)
     squared = 0.0
     for i in range(3):
-        e = u[i] - p[i] + t * (v[i] - u[i]) - s * (q[i] - p[i])
-        squared += e * e
-    return np.sqrt(squared) - radii
+        across[i] = u[i] - p[i] + t * (v[i] - u[i]) - s * (q[i] - p[i])
+        squared += across[i] * across[i]
+    distance = np.sqrt(squared)
+    for i in range(3):
+        across[i] = across[i] / distance if distance > 0.0 else 0.0
+    return distance - radii
+
+
+@njit(cache=True)
+def separation(p, q, u, v, across):
+    """Return how far segments p-q and u-v are apart along a unit vector [m]; negative if they overlap there."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        a += across[i] * p[i]
+        b += across[i] * q[i]
+        c += across[i] * u[i]
+        d += across[i] * v[i]
+    return max(min(c, d) - max(a, b), min(a, b) - max(c, d))
 
 
 @njit(cache=True)

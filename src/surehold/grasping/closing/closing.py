@@ -25,7 +25,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.grasping.closing.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap
+from surehold.grasping.closing.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap, separation
+from surehold.grasping.closing.link_speed import begins, lasts, speed, speed_along
 from surehold.grasping.hand.kinematics import axis_ends, finger_frames
 from surehold.store.kernels import njit
 
@@ -56,32 +57,6 @@ def _link_at(f, k, t, bases, chains, motion, stop, ends, q, frames):
         q[j] = min(max(angle, motion[2, f, j]), motion[3, f, j])
     finger_frames(bases[f], chains[f, : k + 1], q, frames)
     axis_ends(frames[k : k + 1], chains[f, k : k + 1], ends)
-
-
-@njit(cache=True)
-def _speed(f, k, t, motion, stop, reach):
-    """Return an upper bound of the speed of link k of finger f from time t on."""
-    v = 0.0
-    for j in range(k + 1):
-        rate = motion[1, f, j]
-        if stop[f, j] <= t or rate == 0.0:
-            continue
-        final = motion[3, f, j] if rate > 0.0 else motion[2, f, j]
-        if (motion[0, f, j] + rate * t - final) * rate < 0.0:  # not yet at the end of its range
-            v += abs(rate) * reach[f, j, k]
-    return v
-
-
-@njit(cache=True)
-def _begins(f, k, motion, stop):
-    """Return the time at which the first joint that moves link k of finger f leaves the end of its range."""
-    first = np.inf
-    for j in range(k + 1):
-        rate = motion[1, f, j]
-        if stop[f, j] > 0.0 and rate != 0.0:
-            origin = motion[2, f, j] if rate > 0.0 else motion[3, f, j]
-            first = min(first, max((origin - motion[0, f, j]) / rate, 0.0))
-    return first
 
 
 @njit(cache=True)
@@ -187,7 +162,8 @@ def close_hand(
     links = fingers * per_finger
     touched = np.zeros(links, dtype=np.bool_)
     mine, other = np.empty((1, 2, 3)), np.empty((1, 2, 3))
-    q, frames = np.empty(per_finger), np.empty((per_finger, 3, 4))
+    q, frames, frames_b = np.empty(per_finger), np.empty((per_finger, 3, 4)), np.empty((per_finger, 3, 4))
+    across = np.empty(3)
 
     # The gaps to watch: link - object, link - palm, link - link of another finger.
     most = links * (1 + palms.shape[0]) + links * links // 2
@@ -211,9 +187,9 @@ def close_hand(
     open_until = np.empty(total)
     resting = np.zeros(total, dtype=np.bool_)  # not looked at yet: at the first look a touch between neighbors is rest
     for i in range(total):
-        until = _begins(first[i] // per_finger, first[i] % per_finger, motion, stop)
+        until = begins(first[i] // per_finger, first[i] % per_finger, motion, stop)
         if second[i] >= 0:
-            until = min(until, _begins(second[i] // per_finger, second[i] % per_finger, motion, stop))
+            until = min(until, begins(second[i] // per_finger, second[i] % per_finger, motion, stop))
         resting[i] = second[i] != -1
         open_until[i] = until
     pass_time = np.full(links, np.inf)
@@ -233,9 +209,10 @@ def close_hand(
             break
         a, b = first[i], second[i]
         fa, ka = a // per_finger, a % per_finger
-        v = _speed(fa, ka, t, motion, stop, reach)
+        fb, kb = b // per_finger, b % per_finger  # of use where b is a link
+        v = speed(fa, ka, t, motion, stop, reach)
         if b >= 0:
-            v += _speed(b // per_finger, b % per_finger, t, motion, stop, reach)
+            v += speed(fb, kb, t, motion, stop, reach)
         if v == 0.0:
             open_until[i] = np.inf
             continue
@@ -243,15 +220,16 @@ def close_hand(
         radius = radii[fa, ka]
         _link_at(fa, ka, t, bases, chains, motion, stop, mine, q, frames)
         if b == -1:
-            gap = capsule_gap(nodes, frame, mine[0, 0], mine[0, 1], radius, 0.2 * TOUCH, 0.2)[0]
+            gap = 0.0
+            if not looked[a, 0] < 2.0 * brush:
+                gap = capsule_gap(nodes, frame, mine[0, 0], mine[0, 1], radius, 0.2 * TOUCH, 0.2)[0]
             if gap < 2.0 * brush:  # a gap that is underrated now and then hides the closest approach
                 gap = capsule_gap(nodes, frame, mine[0, 0], mine[0, 1], radius, 0.2 * TOUCH, 0.0)[0]
         elif b < -1:
             gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[0, 0], mine[0, 1], radius)
         else:
-            fb, kb = b // per_finger, b % per_finger
-            _link_at(fb, kb, t, bases, chains, motion, stop, other, q, frames)
-            gap = capsule_pair_gap(mine[0, 0], mine[0, 1], other[0, 0], other[0, 1], radius + radii[fb, kb])
+            _link_at(fb, kb, t, bases, chains, motion, stop, other, q, frames_b)
+            gap = capsule_pair_gap(mine[0, 0], mine[0, 1], other[0, 0], other[0, 1], radius + radii[fb, kb], across)
         if b == -1 and brush > 0.0:
             pass_leave[a] = max(pass_leave[a], gap)
             if looked[a, 0] < 1.5 * brush and looked[a, 0] <= looked[a, 1] and looked[a, 0] < gap:
@@ -266,7 +244,18 @@ def close_hand(
             advance = gap - 0.5 * TOUCH
             if b == -1 and gap < 2.0 * brush:
                 advance = min(advance, 0.5 * brush)  # no closest approach slips through between two looks
-            open_until[i] = t + advance / v
+            open_for = advance / v
+            if b >= 0:
+                for direction in range(2):
+                    if direction == 1:  # fingers beside each other move across the axis about which they bend
+                        for n in range(3):
+                            across[n] = frames[ka, n, 2]
+                    parted = separation(mine[0, 0], mine[0, 1], other[0, 0], other[0, 1], across)
+                    va, wa = speed_along(fa, ka, t, across, motion, stop, reach, chains, frames)
+                    vb, wb = speed_along(fb, kb, t, across, motion, stop, reach, chains, frames_b)
+                    parted -= radius + radii[fb, kb] + 0.5 * TOUCH
+                    open_for = max(open_for, lasts(parted, va + vb, wa + wb))
+            open_until[i] = t + open_for
             resting[i] = False
             continue
         open_until[i] = np.inf
@@ -279,7 +268,7 @@ def close_hand(
                 continue
             f, k = body // per_finger, body % per_finger
             last = k if adaptive else per_finger - 1
-            if _speed(f, k, t, motion, stop, reach) > 0.0:
+            if speed(f, k, t, motion, stop, reach) > 0.0:
                 for j in range(last + 1):
                     stop[f, j] = min(stop[f, j], t)
     joints = np.empty((fingers, per_finger))

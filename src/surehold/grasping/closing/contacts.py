@@ -20,7 +20,6 @@ Point and normal of a skin contact are those of the object's surface nearest to 
 see the normal turn over at once where it passes a sharp edge, a skin of thickness rho rolls over it.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -34,9 +33,13 @@ from surehold.store.kernels import njit
 
 __all__ = [
     "DEPTH",
+    "GRADED",
+    "PATCH",
+    "SINGLE",
     "Contacts",
+    "add_outcome",
     "as_contacts",
-    "blended",
+    "end_mixture",
     "pass_share",
     "skin_contacts",
     "touch_contacts",
@@ -46,6 +49,7 @@ Array = NDArray[np.float64]
 
 DEPTH: Final = 0.006  #: depth of the soft touch, delta [m]: what is so near is reached as finger and object give way
 SKIN: Final = 0.002  #: thickness of the skin, rho [m]
+GRADED, PATCH, SINGLE = range(3)  #: the contact models as the compiled functions take them
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,10 +96,11 @@ def touch_contacts(nodes, frame, ends, touched, radii):
 
 
 @njit(cache=True)
-def skin_contacts(nodes, frame, frames, chains, radii, palm, samples, depth, skin, graded):
+def skin_contacts(nodes, frame, frames, chains, radii, palm, samples, depth, graded, first, last):
     """Return contacts (m, 8) of all skin samples (m, 7): point, inward normal, weight, body.
 
-    The weight of a sample that is not nearer than `depth` is 0, and so are its point and normal.
+    The weight of a sample that is not nearer than `depth` is 0, and so are its point and normal; so is all of a sample
+    of a body that is not from `first` to before `last`.
     `frames` (f j, 3, 4) are the moved frames of the joints, `palm` (3, 4) is the palm frame.
     """
     links, joints = frames.shape[0], chains.shape[1]
@@ -106,7 +111,7 @@ def skin_contacts(nodes, frame, frames, chains, radii, palm, samples, depth, ski
             pose[links, i, j] = palm[i, j]
             for body in range(links):
                 pose[body, i, j] = frames[body, i, j]
-    for body in range(links):
+    for body in range(max(first, 0), min(last, links)):
         row = chains[body // joints, body % joints]
         x, y, z, length = pose[body, 0, 3], pose[body, 1, 3], pose[body, 2, 3], 0.0
         for i in range(3):  # at the near end of the link's axis
@@ -119,6 +124,8 @@ def skin_contacts(nodes, frame, frames, chains, radii, palm, samples, depth, ski
     rows = np.zeros((samples.shape[0], 8))
     for m in range(samples.shape[0]):
         body = int(samples[m, 0])
+        if not first <= body < last:
+            continue
         rows[m, 7] = body
         if away[body]:
             continue
@@ -134,29 +141,42 @@ def skin_contacts(nodes, frame, frames, chains, radii, palm, samples, depth, ski
         d = field_distance(nodes, frame, x, y, z)
         if d < depth:
             weight = min(1.0 - d / depth, 1.0) if graded else 1.0
-            _put(rows, m, nodes, frame, x - skin * u, y - skin * v, z - skin * w, weight, body)
+            _put(rows, m, nodes, frame, x - SKIN * u, y - SKIN * v, z - SKIN * w, weight, body)
     return rows
 
 
-def pass_share(gap: float, leave: float, depth: float) -> float:
+@njit(cache=True)
+def pass_share(gap, leave, depth):
     """Return by which share a pass of closest gap `gap`, that then leaves to `leave`, counts as a touch [m]."""
     return max(1.0 - max(gap, 0.0) / depth, 0.0) * min(max(4.0 * (leave - gap) / depth, 0.0), 1.0)
 
 
-def blended(branches: Sequence[tuple[float, Array]]) -> Array:
-    """Return the mixture (m, 8) of outcomes for the same skin samples: pairs of share and contacts (m, 8)."""
-    shares = np.array([share for share, _ in branches])
-    rows = np.stack([rows for _, rows in branches])
-    weights = shares[:, None] * rows[:, :, 6]
-    total = weights.sum(axis=0)
-    safe = np.where(total > 0.0, total, 1.0)
-    force = np.einsum("bm,bmi->mi", weights, rows[:, :, 3:6])
-    size = np.sqrt(np.sum(force * force, axis=1))
-    mixed = np.empty_like(rows[0])
-    mixed[:, :3] = np.einsum("bm,bmi->mi", weights, rows[:, :, :3]) / safe[:, None]
-    mixed[:, 3:6] = force / np.where(size > 0.0, size, 1.0)[:, None]
-    mixed[:, 6], mixed[:, 7] = np.minimum(size, 1.0), rows[0, :, 7]
-    return mixed
+@njit(cache=True)
+def add_outcome(mixture, rows, share, first, last):
+    """Add an outcome's contacts, rows (m, 8), to a mixture (m, 8), for the samples of bodies `first` to before `last`.
+
+    A mixture begins with zeros and sums points, forces and weights, each times weight and share; `end_mixture` ends it.
+    """
+    for m in range(len(rows)):
+        if first <= rows[m, 7] < last:
+            weight = share * rows[m, 6]
+            for i in range(6):
+                mixture[m, i] += weight * rows[m, i]
+            mixture[m, 6] += weight
+
+
+@njit(cache=True)
+def end_mixture(mixture, rows, first, last):
+    """Write the mean force at the mean place to `rows` (m, 8), for the samples of bodies `first` to before `last`."""
+    for m in range(len(rows)):
+        if not first <= rows[m, 7] < last:
+            continue
+        square = mixture[m, 3] ** 2 + mixture[m, 4] ** 2 + mixture[m, 5] ** 2
+        size = np.sqrt(square)
+        for i in range(3):
+            rows[m, i] = mixture[m, i] / mixture[m, 6] if mixture[m, 6] > 0.0 else 0.0
+            rows[m, 3 + i] = mixture[m, 3 + i] / size if size > 0.0 else 0.0
+        rows[m, 6] = min(size, 1.0)
 
 
 def as_contacts(rows: NDArray[np.float64], hand: Hand) -> Contacts:

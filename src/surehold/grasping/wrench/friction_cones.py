@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError, unknown_name
+from surehold.grasping.wrench.ellipsoids import ellipsoids, tangent_field
 
 __all__ = [
     "CheckedContacts",
@@ -34,11 +35,6 @@ Convention = Literal["normal_unit", "unit_magnitude"]
 CONVENTIONS = ("normal_unit", "unit_magnitude")
 _MOST_EDGES = 1000
 _LARGEST = 1e12  # what is computed with larger lengths and coefficients overflows, or divides by 0
-
-# The tangent field below is singular at -_POLE alone. The pole is in general position: faces, chamfers at 45 degrees
-# and barrels of objects modeled along their axes keep clear of it.
-_POLE = np.array([0.36, 0.48, 0.8])
-_POLE_TANGENT = np.array([0.8, -0.6, 0.0])
 
 
 class RoundContacts(NamedTuple):
@@ -95,7 +91,7 @@ class CheckedContacts(NamedTuple):
         if convention not in CONVENTIONS:
             raise unknown_name("convention", convention, CONVENTIONS)
         if tangents is None:
-            t = tangent_field(n)
+            t = tangent_field(np.array(n, dtype=np.float64, order="C"))
         else:
             t = finite_array("tangents", tangents, (c, 3))
             if np.any(np.abs(np.sum(t * t, axis=1) - 1.0) > 1e-6) or np.any(np.abs(np.sum(t * n, axis=1)) > 1e-6):
@@ -117,7 +113,7 @@ def tangents(normals: ArrayLike) -> NDArray[np.float64]:
     the whole sphere; this one is except at a single direction, (-0.36, -0.48, -0.8), away from faces and barrels that
     follow the axes. Give the normals in the object's frame, then the tangents move with the object.
     """
-    return tangent_field(np.asarray(normals, float))
+    return tangent_field(np.array(normals, dtype=np.float64, order="C"))
 
 
 def contact_wrenches(
@@ -170,15 +166,7 @@ def round_contacts(contacts: CheckedContacts) -> RoundContacts:
     <= f_n^2 (Howe and Cutkosky 1996). With "unit_magnitude" the forces of the cone's rim have magnitude one, in
     between less.
     """
-    n, t, arms, mu, gamma, scale = contacts
-    axes = np.zeros((len(n), 6, 3))
-    for k, (direction, length) in enumerate(((t, mu * scale), (_cross(n, t), mu * scale))):
-        force = length[:, None] * direction
-        axes[:, :3, k] = force
-        axes[:, 3:, k] = _cross(arms, force)
-    axes[:, 3:, 2] = (gamma * scale)[:, None] * n
-    force = scale[:, None] * n
-    return RoundContacts(np.hstack((force, _cross(arms, force))), axes)
+    return RoundContacts(*ellipsoids(*(np.array(a, dtype=np.float64, order="C") for a in contacts)))
 
 
 def soft_finger_torsion(friction: float, radius: float) -> float:
@@ -191,14 +179,6 @@ def soft_finger_torsion(friction: float, radius: float) -> float:
         if not (np.isfinite(value) and value >= 0.0):
             raise InputError(f"{name} of a soft finger is {value!r}; give a finite number of 0 or more.")
     return 3.0 * np.pi / 16.0 * float(friction) * float(radius)
-
-
-def tangent_field(n: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return `tangents` of a float array."""
-    closeness = 1.0 + n @ _POLE
-    turned = _POLE_TANGENT - ((n @ _POLE_TANGENT) / np.where(closeness > 1e-14, closeness, 1.0))[:, None] * (n + _POLE)
-    turned -= np.sum(turned * n, axis=1)[:, None] * n
-    return turned / np.sqrt(np.sum(turned * turned, axis=1))[:, None]
 
 
 def finite_array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:

@@ -36,6 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.choices import CONES, QUALITIES
 from surehold.grasping.object.model import GraspObject
+from surehold.grasping.wrench.ellipsoids import RoundCones
 from surehold.grasping.wrench.equilibrium import balance_quality, min_weight
 from surehold.grasping.wrench.force_closure import force_closure, gravity_wrenches, task_quality
 from surehold.grasping.wrench.friction_cones import CONVENTIONS, Convention, finite_array
@@ -99,6 +100,15 @@ class Measure:
             torsion=self.torsion,
             cones=self.cones,
         )
+
+    def round_cones(self) -> RoundCones | None:
+        """Return what epsilon of round cones depends on, beside the contacts; None for another measure."""
+        if self.name != "epsilon" or self.cones != "round":
+            return None
+        divisor = 1.0 if self.convention == "normal_unit" else float(np.sqrt(1.0 + self.friction * self.friction))
+        length = float(self.obj.torque_length)
+        center = np.array(self.obj.center_of_mass, dtype=np.float64)
+        return RoundCones(float(self.friction), float(self.torsion) / length, divisor, length, center)
 
     def value(self, points: Array, normals: Array, wrench: WrenchQuality) -> float:
         """Return the measure of at least two contacts, whose `wrench` is given."""

@@ -7,11 +7,11 @@ h(u)     support function of H, for a unit vector u (6,)
 epsilon  radius of the largest ball about the origin in H: min of h(u) over u, 0 if that is negative
 
 Distances below 1e-11 of the largest wrench are exactly 0. epsilon comes from the compiled expansion of the nearest
-facet. Should rounding spoil that, as wrenches apart by about that tolerance can, it is repeated with a coarser
-tolerance; should that fail too, the full hull of joggled wrenches (Qhull) decides, or for round cones the bounds
-reached so far. Numerical failure is never scored as 0.
+facet. Should rounding spoil that, whatever the tolerance, the full hull of joggled wrenches (Qhull) decides, or for
+round cones the bounds reached so far. Numerical failure is never scored as 0.
 """
 
+import threading
 from typing import NamedTuple
 
 import numpy as np
@@ -19,26 +19,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
 from surehold.grasping.wrench.friction_cones import RoundContacts, finite_array
-from surehold.grasping.wrench.hull.nearest_facet import DONE, FAILED, FLAT, OUTSIDE, SPENT, expand_nearest
+from surehold.grasping.wrench.hull.expansion import FACETS, ROUND_GAP, TOLERANCES, expand, largest
+from surehold.grasping.wrench.hull.nearest_facet import DONE, FAILED, OUTSIDE
+from surehold.grasping.wrench.hull.workspace import workspace
 
 __all__ = ["InscribedBall", "ball_inside", "ball_radius", "hull_volume", "inscribed_ball", "nearest_point"]
 
-TOLERANCES = (1e-11, 1e-9)
-"""Tried in turn: distances below this fraction of the largest wrench count as zero."""
-ROUND_TOLERANCES = (1e-11, 1e-9, 1e-7)
-"""The same for round cones, which Qhull cannot take."""
-FACET_BUDGETS = (4096, 65_536, 1_048_576)
-"""Memory for so many facets is tried in turn; grasps need hundreds to thousands."""
-ROUND_FACET_BUDGETS = (16_384, 65_536)
-"""The same for round cones, which need more and, stopped, are bounded all the same."""
 MAX_WRENCHES = 65_535  # the compiled expansion packs four indices of wrenches into 64 bits
-ROUND_GAP = 1e-9
-"""Difference of the bounds at which round cones count as measured, as a fraction of the largest wrench.
-
-Perfectly symmetric contacts around an axis, whose weakest directions form a continuum, end at about 1e-3.
-"""
 
 _NO_ROUND = RoundContacts(np.zeros((0, 6)), np.zeros((0, 6, 3)))
+_memory = threading.local()
 
 
 class InscribedBall(NamedTuple):
@@ -68,12 +58,12 @@ class InscribedBall(NamedTuple):
 def ball_radius(wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None) -> float:
     """Return epsilon of wrenches (m, 6), which must be finite; the fast path, nothing else is computed or checked.
 
-    With round contacts, their cone edges (any number of edges, 4 will do) must be among the wrenches.
+    With round contacts it is theirs, and the wrenches, their cone edges, are used where rounding spoils the expansion.
     """
-    status, lower, upper, *_ = _expand(wrenches, round_contacts)
+    status, epsilon, *_ = _expand(wrenches, round_contacts)
     if status == FAILED:
         return _ball_from_hull(wrenches)[0]
-    return 0.0 if status != DONE else upper if round_contacts is None else lower
+    return epsilon if status == DONE else 0.0
 
 
 def inscribed_ball(wrenches: ArrayLike, round_contacts: RoundContacts | None = None) -> InscribedBall:
@@ -105,15 +95,15 @@ def ball_inside(
 
 def _ball(w: NDArray[np.float64], round_contacts: RoundContacts | None) -> InscribedBall:
     """Return the ball; where there is none its radius and lower bound are 0, and how far the hull is stays open."""
-    status, lower, upper, normal, expansions, facets, fallbacks = _expand(w, round_contacts)
+    status, epsilon, lower, upper, normal, expansions, facets, fallbacks = _expand(w, round_contacts)
     if status == FAILED:
-        lower, normal = _ball_from_hull(w)
+        epsilon, normal = _ball_from_hull(w)
+        lower = epsilon
         upper = lower if round_contacts is None else max(lower, _round_support(normal, round_contacts))
         status = DONE if lower > 0.0 else OUTSIDE
     if status != DONE:
         return InscribedBall(0.0, 0.0, upper, normal, expansions, facets, fallbacks)
-    signed = upper if round_contacts is None else lower
-    return InscribedBall(signed, lower, upper, normal, expansions, facets, fallbacks)
+    return InscribedBall(epsilon, lower, upper, normal, expansions, facets, fallbacks)
 
 
 def nearest_point(wrenches: NDArray[np.float64], round_contacts: RoundContacts | None = None) -> NDArray[np.float64]:
@@ -124,7 +114,7 @@ def nearest_point(wrenches: NDArray[np.float64], round_contacts: RoundContacts |
     drop those whose weight turns negative.
     """
     centers, axes = round_contacts or _NO_ROUND
-    scale = _largest(wrenches)
+    scale = largest(wrenches)
     stop = scale * (ROUND_GAP if len(centers) else TOLERANCES[0])
     corral = wrenches[[np.argmin(np.sum(wrenches**2, axis=1))]]
     weights = np.ones(1)
@@ -178,38 +168,15 @@ def hull_volume(wrenches: ArrayLike) -> float:
 
 def _expand(
     w: NDArray[np.float64], round_contacts: RoundContacts | None
-) -> tuple[int, float, float, NDArray[np.float64], int, int, int]:
-    """Run `expand_nearest` with the memory and tolerance it needs; its result, and the fallbacks.
-
-    The status is DONE if there is a ball, FLAT or OUTSIDE if not, FAILED if the full hull must decide.
-    """
-    flat = np.zeros(6)
-    if len(w) < 7:
-        return FLAT, 0.0, 0.0, flat, 0, 0, 0
+) -> tuple[int, float, float, float, NDArray[np.float64], int, int, int]:
+    """Run `expand` in the memory of this thread."""
     if len(w) > MAX_WRENCHES:
         raise InputError(f"{len(w)} wrenches are too many, {MAX_WRENCHES} can be measured; merge contacts.")
-    w = np.array(w, np.float64, order="C")  # other layouts and read-only arrays would be compiled for anew
-    centers, axes = (np.array(a, np.float64, order="C") for a in round_contacts or _NO_ROUND)
-    gap = ROUND_GAP if len(centers) else 0.0
-    budgets = ROUND_FACET_BUDGETS if len(centers) else FACET_BUDGETS
-    tolerances = ROUND_TOLERANCES if len(centers) else TOLERANCES
-    best = FAILED, 0.0, 0.0, flat, 0, 0, len(tolerances)
-    for fallbacks, tolerance in enumerate(tolerances):
-        result = expand_nearest(w, centers, axes, tolerance, gap, budgets[0])
-        for budget in budgets[1:]:
-            if result[0] != SPENT:
-                break
-            result = expand_nearest(w, centers, axes, tolerance, gap, budget)
-        status, lower, upper, normal, expansions, facets = result
-        if status == SPENT and len(centers):
-            status = DONE  # the bounds hold, they are only wider apart
-        if status == DONE and lower <= tolerance * _largest(w):
-            status = OUTSIDE
-        if status in (DONE, FLAT, OUTSIDE):
-            return status, lower, upper, normal, expansions, facets, fallbacks
-        if len(centers) and lower > max(best[1], tolerance * _largest(w)):
-            best = DONE, lower, upper, normal, expansions, facets, len(tolerances)
-    return best
+    if not hasattr(_memory, "work"):
+        _memory.work = workspace(FACETS)
+    # other layouts and read-only arrays would be compiled for anew
+    w, centers, axes = (np.array(a, np.float64, order="C") for a in (w, *(round_contacts or _NO_ROUND)))
+    return expand(w, centers, axes, _memory.work)
 
 
 def _ball_from_hull(w: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
@@ -219,15 +186,10 @@ def _ball_from_hull(w: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]
     equations = ConvexHull(w, qhull_options="QJ Pp").equations
     nearest = int(np.argmax(equations[:, -1]))
     radius = -float(equations[nearest, -1])
-    return (radius if radius > 1e-9 * _largest(w) else 0.0), equations[nearest, :-1].copy()  # joggled zero is zero
+    return (radius if radius > 1e-9 * largest(w) else 0.0), equations[nearest, :-1].copy()  # joggled zero is zero
 
 
 def _round_support(u: NDArray[np.float64], round_contacts: RoundContacts) -> float:
     """Return h(u) of round contacts."""
     centers, axes = round_contacts
     return float(np.max(centers @ u + np.sqrt(np.sum(np.einsum("j,ijk->ik", u, axes) ** 2, axis=1))))
-
-
-def _largest(w: NDArray[np.float64]) -> float:
-    """Return the norm of the largest wrench."""
-    return float(np.sqrt(np.max(np.einsum("ij,ij->i", w, w))))

@@ -1,0 +1,68 @@
+"""Bounds of how links move, against the motion itself in small steps."""
+
+import numpy as np
+import pytest
+
+from surehold.grasping.closing.link_speed import begins, lasts, speed, speed_along
+from surehold.grasping.hand.kinematics import finger_frames, link_ends
+from surehold.grasping.hand.model import CLOSED
+from surehold.grasping.hand.named import hand_named
+from surehold.grasping.hand.synergy import closing_motion
+
+
+@pytest.mark.parametrize("s1", [0.0, -0.9])
+def test_no_link_moves_farther_than_its_bounds(s1):
+    hand = hand_named("icub-left")
+    motion, reach = np.stack(closing_motion(hand, s1, "power")), hand.reach()
+    fingers, joints = hand.radii.shape
+    rng = np.random.default_rng(0)
+    tightest = np.inf
+    for _ in range(60):
+        f, k = int(rng.integers(fingers)), int(rng.integers(joints))
+        stop = np.where(rng.random(hand.radii.shape) < 0.3, rng.uniform(0.0, CLOSED, hand.radii.shape), np.inf)
+        early = float(rng.uniform(0.0, 0.9 * CLOSED))
+        across = rng.normal(size=3)
+        across /= np.linalg.norm(across)
+
+        def posture(t, stop=stop):
+            return np.clip(motion[0] + motion[1] * np.minimum(t, stop), motion[2], motion[3])
+
+        frames = np.empty((joints, 3, 4))
+        finger_frames(hand.bases[f], hand.chains[f], posture(early)[f], frames)
+        if rng.random() < 0.5:
+            across = frames[k, :, 2].copy()  # the axis about which the link bends
+        v, w = speed_along(f, k, early, across, motion, stop, reach, hand.chains, frames)
+        start = link_ends(hand.bases, hand.chains, posture(early))[joints * f + k]
+        for t in np.linspace(early, CLOSED, 40)[1:]:
+            way = link_ends(hand.bases, hand.chains, posture(t))[joints * f + k] - start
+            s = t - early
+            bound = v * s + 0.5 * w * s * s
+            assert np.abs(way @ across).max() <= bound + 1e-12
+            assert np.linalg.norm(way, axis=1).max() <= speed(f, k, early, motion, stop, reach) * s + 1e-12
+            if bound > 1e-6:
+                tightest = min(tightest, bound / max(np.abs(way @ across).max(), 1e-9))
+            assert lasts(bound, v, w) == pytest.approx(s, rel=1e-9) or bound == 0.0
+    assert tightest < 1.5, "a bound that is never near the truth certifies nothing"
+
+
+def test_a_way_that_is_never_gone_lasts_for_ever():
+    assert lasts(0.01, 0.0, 0.0) == np.inf
+    assert lasts(-0.01, 1.0, 1.0) == 0.0
+    assert lasts(0.5, 0.0, 1.0) == pytest.approx(1.0)
+    assert lasts(0.5, 2.0, 0.0) == pytest.approx(0.25)
+
+
+def test_a_link_begins_when_its_first_joint_leaves_its_range():
+    hand = hand_named("icub-left")
+    motion = np.stack(closing_motion(hand, 0.0, "power"))
+    stop = np.full(hand.radii.shape, np.inf)
+    for f in range(len(hand.radii)):
+        for k in range(hand.radii.shape[1]):
+            t = begins(f, k, motion, stop)
+
+            def moves(late, f=f, k=k):
+                opened, later = (np.clip(motion[0] + motion[1] * t, motion[2], motion[3]) for t in (0.0, late))
+                return not np.array_equal(opened[f, : k + 1], later[f, : k + 1])
+
+            assert t == 0.0 or not moves(min(t, 2.0 * CLOSED) - 1e-9)
+            assert t == np.inf or moves(t + 1e-3)
