@@ -31,7 +31,7 @@ def test_no_link_moves_farther_than_its_bounds(s1):
         finger_frames(hand.bases[f], hand.chains[f], posture(early)[f], frames)
         if rng.random() < 0.5:
             across = frames[k, :, 2].copy()  # the axis about which the link bends
-        v, w = speed_along(f, k, early, across, motion, stop, reach, hand.chains, frames)
+        v, w = speed_along(f, k, early, across, motion, stop, reach, hand.chains, frames[:, :, 2].copy())
         start = link_ends(hand.bases, hand.chains, posture(early))[joints * f + k]
         for t in np.linspace(early, CLOSED, 40)[1:]:
             way = link_ends(hand.bases, hand.chains, posture(t))[joints * f + k] - start

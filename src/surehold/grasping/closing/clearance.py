@@ -14,8 +14,9 @@ import numpy as np
 from surehold.grasping.object.distance_field import field_distance
 from surehold.store.kernels import njit
 
-__all__ = ["box_gap", "capsule_gap", "capsule_pair_gap", "palm_gap", "separation"]
+__all__ = ["box_gap", "capsule_gap", "capsule_pair_gap", "palm_gap", "piece_memory", "separation"]
 
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 _DEPTH = 64  # more than the halvings of 0.1 m that anyone can ask for, and the siblings that wait meanwhile
 
 
@@ -29,16 +30,20 @@ def _below(fa, fb, length):
 
 
 @njit(cache=True)
-def capsule_gap(nodes, frame, near, far, radius, tolerance, slack):
+def piece_memory():
+    """Return memory for pieces of a capsule's axis, (4, n): to ask for it at every look would take as long as that."""
+    return np.empty((4, _DEPTH))
+
+
+@njit(cache=True)
+def capsule_gap(nodes, frame, near, far, radius, tolerance, slack, pieces):
     """Return the gap of a capsule to the object [m], never overrated by more than `tolerance`, and where it is.
 
     The gap may be underrated by `tolerance` + `slack` x gap. Second number: place of the minimum on the axis, 0 to 1.
+    `pieces` is memory, `piece_memory()`.
     """
     length = np.sqrt((far[0] - near[0]) ** 2 + (far[1] - near[1]) ** 2 + (far[2] - near[2]) ** 2)
-    start = np.empty(_DEPTH)
-    size = np.empty(_DEPTH)
-    left = np.empty(_DEPTH)
-    right = np.empty(_DEPTH)
+    start, size, left, right = pieces[0], pieces[1], pieces[2], pieces[3]
     start[0], size[0] = 0.0, 1.0
     left[0] = field_distance(nodes, frame, near[0], near[1], near[2])
     right[0] = field_distance(nodes, frame, far[0], far[1], far[2])
@@ -131,19 +136,29 @@ def _box_value(pose, half, rounding, x, y, z):
 
 @njit(cache=True)
 def box_gap(pose, half, rounding, near, far, radius):
-    """Return the gap between a capsule and the palm's box [m]: the distance to a box is convex along the axis."""
-    lo, hi = 0.0, 1.0
+    """Return the gap between a capsule and the palm's box [m], underrated by at most 1e-6 and 2 % of itself.
+
+    The distance to a box is convex along the axis: golden section, until no place in what is left can be much nearer.
+    """
     dx, dy, dz = far[0] - near[0], far[1] - near[1], far[2] - near[2]
-    for _ in range(24):  # shrinks 25 mm below 0.002 mm
-        a, b = lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0
-        fa = _box_value(pose, half, rounding, near[0] + a * dx, near[1] + a * dy, near[2] + a * dz)
-        fb = _box_value(pose, half, rounding, near[0] + b * dx, near[1] + b * dy, near[2] + b * dz)
+    length = np.sqrt(dx * dx + dy * dy + dz * dz)
+    lo, hi = 0.0, 1.0
+    a, b = 1.0 - _GOLDEN, _GOLDEN
+    fa = _box_value(pose, half, rounding, near[0] + a * dx, near[1] + a * dy, near[2] + a * dz)
+    fb = _box_value(pose, half, rounding, near[0] + b * dx, near[1] + b * dy, near[2] + b * dz)
+    while True:
+        gap = min(fa, fb) - radius
+        within = (hi - lo) * _GOLDEN * length  # how far the minimum can be from the place of the smaller value
+        if within <= max(1e-6, 0.02 * gap):
+            return gap - within
         if fa < fb:
-            hi = b
+            hi, b, fb = b, a, fa
+            a = hi - _GOLDEN * (hi - lo)
+            fa = _box_value(pose, half, rounding, near[0] + a * dx, near[1] + a * dy, near[2] + a * dz)
         else:
-            lo = a
-    m = 0.5 * (lo + hi)
-    return _box_value(pose, half, rounding, near[0] + m * dx, near[1] + m * dy, near[2] + m * dz) - radius
+            lo, a, fa = a, b, fb
+            b = lo + _GOLDEN * (hi - lo)
+            fb = _box_value(pose, half, rounding, near[0] + b * dx, near[1] + b * dy, near[2] + b * dz)
 
 
 @njit(cache=True)

@@ -25,9 +25,16 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.grasping.closing.clearance import box_gap, capsule_gap, capsule_pair_gap, palm_gap, separation
+from surehold.grasping.closing.clearance import (
+    box_gap,
+    capsule_gap,
+    capsule_pair_gap,
+    palm_gap,
+    piece_memory,
+    separation,
+)
 from surehold.grasping.closing.link_speed import begins, lasts, speed, speed_along
-from surehold.grasping.hand.kinematics import axis_ends, finger_frames
+from surehold.grasping.hand.kinematics import axis_ends, frame_columns, moved_joint, next_joint
 from surehold.store.kernels import njit
 
 __all__ = ["TOUCH", "Closed", "close_hand", "hand_gaps"]
@@ -47,45 +54,48 @@ class Closed(NamedTuple):
 
 
 @njit(cache=True)
-def _link_at(f, k, t, bases, chains, motion, stop, ends, q, frames):
-    """Write the ends (1, 2, 3) of link k of finger f at time t; motion is (4, f, j): start, rate, lower, upper.
+def _link_at(f, k, t, bases, chains, motion, stop, ends, turns):
+    """Write the ends (2, 3) of link k of finger f at time t, and the axes of the joints up to it into turns (j, 3).
 
-    `q` (j,) and `frames` (j, 3, 4) are overwritten: to ask for memory at every look would take as long as the look.
+    motion is (4, f, j): start, rate, lower, upper.
     """
+    x, y, z, p = frame_columns(bases[f])
     for j in range(k + 1):
+        if j > 0:
+            x, y, z, p = next_joint(chains[f, j - 1], x, y, z, p)
         angle = motion[0, f, j] + motion[1, f, j] * min(t, stop[f, j])
-        q[j] = min(max(angle, motion[2, f, j]), motion[3, f, j])
-    finger_frames(bases[f], chains[f, : k + 1], q, frames)
-    axis_ends(frames[k : k + 1], chains[f, k : k + 1], ends)
+        x, y, p = moved_joint(chains[f, j], min(max(angle, motion[2, f, j]), motion[3, f, j]), x, y, z, p)
+        turns[j, 0], turns[j, 1], turns[j, 2] = z
+    axis_ends(chains[f, k], x, y, z, p, ends)
 
 
 @njit(cache=True)
-def _gap_at(f, k, t, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames):
+def _gap_at(f, k, t, nodes, frame, bases, chains, motion, stop, radius, ends, turns, pieces):
     """Return the gap between link k of finger f and the object at time t [m]."""
-    _link_at(f, k, t, bases, chains, motion, stop, ends, q, frames)
-    return capsule_gap(nodes, frame, ends[0, 0], ends[0, 1], radius, 1e-6, 0.0)[0]
+    _link_at(f, k, t, bases, chains, motion, stop, ends, turns)
+    return capsule_gap(nodes, frame, ends[0], ends[1], radius, 1e-6, 0.0, pieces)[0]
 
 
 @njit(cache=True)
-def _closest(f, k, early, late, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames):
+def _closest(f, k, early, late, nodes, frame, bases, chains, motion, stop, radius, ends, turns, pieces):
     """Return time and gap of the closest approach between two times; an infinite gap if it is at one of them."""
     share = 0.5 * (np.sqrt(5.0) - 1.0)  # golden section
     a, b = early, late
     c, d = b - share * (b - a), a + share * (b - a)
-    gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
-    gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
+    gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends, turns, pieces)
+    gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends, turns, pieces)
     for _ in range(22):  # to 3e-5 of the interval
         if gc < gd:
             b, d, gd = d, c, gc
             c = b - share * (b - a)
-            gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
+            gc = _gap_at(f, k, c, nodes, frame, bases, chains, motion, stop, radius, ends, turns, pieces)
         else:
             a, c, gc = c, d, gd
             d = a + share * (b - a)
-            gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
+            gd = _gap_at(f, k, d, nodes, frame, bases, chains, motion, stop, radius, ends, turns, pieces)
     t, gap = (c, gc) if gc < gd else (d, gd)
-    first = _gap_at(f, k, early, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
-    last = _gap_at(f, k, late, nodes, frame, bases, chains, motion, stop, radius, ends, q, frames)
+    first = _gap_at(f, k, early, nodes, frame, bases, chains, motion, stop, radius, ends, turns, pieces)
+    last = _gap_at(f, k, late, nodes, frame, bases, chains, motion, stop, radius, ends, turns, pieces)
     return t, (gap if gap < min(first, last) else np.inf)
 
 
@@ -121,11 +131,11 @@ def hand_gaps(nodes, frame, ends, radii, palms, halves, roundings, enough):
     A link that is not there has an infinite gap.
     """
     links = ends.shape[0]
-    gaps = np.full(links + 1, np.inf)
+    gaps, pieces = np.full(links + 1, np.inf), piece_memory()
     for b in range(links):
         radius = radii[b // radii.shape[1], b % radii.shape[1]]
         if radius > 0.0:
-            gaps[b] = capsule_gap(nodes, frame, ends[b, 0], ends[b, 1], radius, 1e-6, 0.0)[0]
+            gaps[b] = capsule_gap(nodes, frame, ends[b, 0], ends[b, 1], radius, 1e-6, 0.0, pieces)[0]
     for p in range(palms.shape[0]):
         gap = palm_gap(nodes, frame, palms[p], halves[p], roundings[p], 1e-5, enough)
         gaps[links] = min(gaps[links], gap)
@@ -161,9 +171,9 @@ def close_hand(
     fingers, per_finger = radii.shape
     links = fingers * per_finger
     touched = np.zeros(links, dtype=np.bool_)
-    mine, other = np.empty((1, 2, 3)), np.empty((1, 2, 3))
-    q, frames, frames_b = np.empty(per_finger), np.empty((per_finger, 3, 4)), np.empty((per_finger, 3, 4))
-    across = np.empty(3)
+    mine, other = np.empty((2, 3)), np.empty((2, 3))
+    turns, turns_b = np.empty((per_finger, 3)), np.empty((per_finger, 3))
+    across, pieces = np.empty(3), piece_memory()
 
     # The gaps to watch: link - object, link - palm, link - link of another finger.
     most = links * (1 + palms.shape[0]) + links * links // 2
@@ -218,23 +228,23 @@ def close_hand(
             continue
         looks += 1
         radius = radii[fa, ka]
-        _link_at(fa, ka, t, bases, chains, motion, stop, mine, q, frames)
+        _link_at(fa, ka, t, bases, chains, motion, stop, mine, turns)
         if b == -1:
             gap = 0.0
             if not looked[a, 0] < 2.0 * brush:
-                gap = capsule_gap(nodes, frame, mine[0, 0], mine[0, 1], radius, 0.2 * TOUCH, 0.2)[0]
+                gap = capsule_gap(nodes, frame, mine[0], mine[1], radius, 0.2 * TOUCH, 0.2, pieces)[0]
             if gap < 2.0 * brush:  # a gap that is underrated now and then hides the closest approach
-                gap = capsule_gap(nodes, frame, mine[0, 0], mine[0, 1], radius, 0.2 * TOUCH, 0.0)[0]
+                gap = capsule_gap(nodes, frame, mine[0], mine[1], radius, 0.2 * TOUCH, 0.0, pieces)[0]
         elif b < -1:
-            gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[0, 0], mine[0, 1], radius)
+            gap = box_gap(palms[-2 - b], halves[-2 - b], roundings[-2 - b], mine[0], mine[1], radius)
         else:
-            _link_at(fb, kb, t, bases, chains, motion, stop, other, q, frames_b)
-            gap = capsule_pair_gap(mine[0, 0], mine[0, 1], other[0, 0], other[0, 1], radius + radii[fb, kb], across)
+            _link_at(fb, kb, t, bases, chains, motion, stop, other, turns_b)
+            gap = capsule_pair_gap(mine[0], mine[1], other[0], other[1], radius + radii[fb, kb], across)
         if b == -1 and brush > 0.0:
             pass_leave[a] = max(pass_leave[a], gap)
             if looked[a, 0] < 1.5 * brush and looked[a, 0] <= looked[a, 1] and looked[a, 0] < gap:
                 when, near = _closest(
-                    fa, ka, times[a, 1], t, nodes, frame, bases, chains, motion, stop, radius, other, q, frames
+                    fa, ka, times[a, 1], t, nodes, frame, bases, chains, motion, stop, radius, other, turns, pieces
                 )
                 if near < min(brush, pass_gap[a]):
                     pass_time[a], pass_gap[a], pass_leave[a] = when, near, gap
@@ -247,12 +257,14 @@ def close_hand(
             open_for = advance / v
             if b >= 0:
                 for direction in range(2):
+                    if t + open_for >= closed:
+                        break
                     if direction == 1:  # fingers beside each other move across the axis about which they bend
                         for n in range(3):
-                            across[n] = frames[ka, n, 2]
-                    parted = separation(mine[0, 0], mine[0, 1], other[0, 0], other[0, 1], across)
-                    va, wa = speed_along(fa, ka, t, across, motion, stop, reach, chains, frames)
-                    vb, wb = speed_along(fb, kb, t, across, motion, stop, reach, chains, frames_b)
+                            across[n] = turns[ka, n]
+                    parted = separation(mine[0], mine[1], other[0], other[1], across)
+                    va, wa = speed_along(fa, ka, t, across, motion, stop, reach, chains, turns)
+                    vb, wb = speed_along(fb, kb, t, across, motion, stop, reach, chains, turns_b)
                     parted -= radius + radii[fb, kb] + 0.5 * TOUCH
                     open_for = max(open_for, lasts(parted, va + vb, wa + wb))
             open_until[i] = t + open_for

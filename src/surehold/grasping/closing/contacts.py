@@ -26,7 +26,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.grasping.closing.clearance import capsule_gap
+from surehold.grasping.closing.clearance import capsule_gap, piece_memory
 from surehold.grasping.hand.model import Hand
 from surehold.grasping.object.distance_field import field_distance, field_distance_gradient
 from surehold.store.kernels import njit
@@ -89,7 +89,7 @@ def touch_contacts(nodes, frame, ends, touched, radii):
         if touched[body]:
             near, far = ends[body, 0], ends[body, 1]
             radius = radii[body // radii.shape[1], body % radii.shape[1]]
-            s = capsule_gap(nodes, frame, near, far, radius, 1e-7, 0.0)[1]
+            s = capsule_gap(nodes, frame, near, far, radius, 1e-7, 0.0, piece_memory())[1]
             p = near + s * (far - near)
             n = _put(rows, n, nodes, frame, p[0], p[1], p[2], 1.0, body)
     return rows[:n]

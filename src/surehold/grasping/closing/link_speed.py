@@ -30,12 +30,13 @@ def speed(f, k, t, motion, stop, reach):
 
 
 @njit(cache=True)
-def speed_along(f, k, t, across, motion, stop, reach, chains, frames):
+def speed_along(f, k, t, across, motion, stop, reach, chains, turns):
     """Return V, W: in the time s from t on, link k of finger f moves along a unit vector by at most V s + W s^2 / 2.
 
     A joint that turns at the rate r about an axis a moves a point at the lever l by r across . (a x l), at most
     r |l| |across x a|. The axis itself turns no faster than the joints before it do, each by the sine of its angle to
-    a, and that is at most the sum of the sines from joint to joint. `frames` (j, 3, 4) are those of the finger at t.
+    a, and that is at most the sum of the sines from joint to joint. `turns` (j, 3) are the axes
+    of the joints at t.
     """
     v, w = 0.0, 0.0
     rates, turning = 0.0, 0.0  # of the joints before, and how fast the axis turns with them
@@ -48,9 +49,9 @@ def speed_along(f, k, t, across, motion, stop, reach, chains, frames):
         if chains[f, j, 0] > 0.0:
             v += rate
             continue
-        x = across[1] * frames[j, 2, 2] - across[2] * frames[j, 1, 2]
-        y = across[2] * frames[j, 0, 2] - across[0] * frames[j, 2, 2]
-        z = across[0] * frames[j, 1, 2] - across[1] * frames[j, 0, 2]
+        x = across[1] * turns[j, 2] - across[2] * turns[j, 1]
+        y = across[2] * turns[j, 0] - across[0] * turns[j, 2]
+        z = across[0] * turns[j, 1] - across[1] * turns[j, 0]
         v += rate * reach[f, j, k] * np.sqrt(x * x + y * y + z * z)
         w += rate * reach[f, j, k] * turning
         rates += rate
