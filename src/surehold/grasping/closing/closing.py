@@ -8,7 +8,9 @@
 
 A gap that is g at time t stays open until t + g / v. The times until which each gap is certified open are kept, and
 always the earliest of them is looked at again: no step size, no touch missed, and the exact order of the touches
-(Mirtich 1996, chapter 2; Zhang, Lee and Kim 2006). A gap below `TOUCH` is a touch.
+(Mirtich 1996, chapter 2; Zhang, Lee and Kim 2006). A gap below `TOUCH` is a touch; one that does not fall below half
+of it may pass. Two links also stay apart as long as they are along one direction in which they approach slowly:
+fingers beside each other hardly move along the axes about which they bend.
 
 `adaptive`: a touch stops the joints that move the touching link; the links beyond it go on. `synergy`: it stops all
 joints of the finger. Fingers stop each other and stop at the palm in the same way. Bodies of the hand that already

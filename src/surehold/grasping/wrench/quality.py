@@ -21,8 +21,8 @@ of the object from the fingers, the mean over them, in torque lengths, so that a
 Of the task, gravity in 14 directions is the default: the quality is then the weight that is held however the hand is
 turned, divided by the sum of the normal forces.
 Round cones are the default. Cones of eight edges underrate epsilon by a few percent on average and by more where few
-contacts hold, and their value depends on where the edges point; round ones cost about a millisecond more. Their
-epsilon is a certified lower bound, `WrenchQuality.upper` the upper one.
+contacts hold, and their value depends on where the edges point; round ones take up to twice as long, about half a
+millisecond. Their epsilon is a minimum of h to rounding, `WrenchQuality.lower` a certified lower bound.
 """
 
 from dataclasses import dataclass

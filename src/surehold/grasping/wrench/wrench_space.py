@@ -61,13 +61,17 @@ class WrenchQuality:
     """What `grasp_to_dict` tells beside the fields."""
 
     epsilon: float
-    """Radius of the largest origin-centered ball in the hull of the wrenches; 0 means not force closure."""
+    """Radius of the largest origin-centered ball in the hull of the wrenches; 0 means not force closure.
+
+    Of round cones the least resistance that was found, a minimum to rounding: another one that is lower could hide
+    between the bounds, as in four of 307 grasps of the mug, the bottle and the drill, by 3e-5 at most.
+    """
     force_closure: bool
     """Whether epsilon > 0."""
     lower: float
     """Certified lower bound of epsilon."""
     upper: float
-    """Certified upper bound of epsilon; equal to `lower` to rounding, for round cones usually to 1e-9."""
+    """Certified upper bound of epsilon; equal to `lower` to rounding, for round cones to 1e-4 of the largest wrench."""
     fallbacks: int
     """0: as planned; else how often rounding spoiled the expansion: a coarser tolerance helps, or the full hull."""
     wrenches: NDArray[np.float64] = field(repr=False, compare=False, metadata={"derived": True})
