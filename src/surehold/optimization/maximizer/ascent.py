@@ -8,12 +8,14 @@ Legend
     U   their points (r, d), values F (r,), gradients G (r, d)
     B   approximations of the inverse of minus the Hessian, (r, d, d)
     t   step lengths (r,), 1 for the quasi-Newton step
+    S   steps (r, d), Y what they took off the gradients (r, d)
 
 BFGS (Nocedal and Wright 2006, formula 6.17) with backtracking; coordinates at a border that the gradient points out of
 stay there, the others' steps are cut off at the borders (Bertsekas 1982).
 """
 
-from typing import Protocol
+from math import frexp, isfinite, ldexp, sqrt
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,7 @@ from surehold.defaults import (
     ASCENT_SHORTEN,
     ASCENT_SUFFICIENT,
 )
+from surehold.store.kernels import njit
 
 __all__ = ["Objective", "climb"]
 
@@ -58,67 +61,136 @@ def climb(
     sound = np.isfinite(values) & np.isfinite(gradients).all(axis=1)
     values = np.where(sound, values, -np.inf)
     alive = np.flatnonzero(sound)
-    U, F, G = points[alive], values[alive], gradients[alive]
-    low, high = lower[alive], upper[alive]
-    d = U.shape[1]
-    B = _scaled_identity(ASCENT_FIRST_STEP / np.maximum(np.abs(G).max(axis=1), 1e-300), d)
-    fresh = np.ones(len(U), dtype=bool)
-    t = np.ones(len(U))
+    state = _State.at(points[alive], values[alive], gradients[alive], lower[alive], upper[alive])
     for _ in range(evaluations - 1):
         if len(alive) == 0:
             break
-        held = ((low >= U) & (G < 0.0)) | ((high <= U) & (G > 0.0))
-        free = np.where(held, 0.0, G)
-        direction = np.where(held, 0.0, np.einsum("rij,rj->ri", B, free))
-        length = np.abs(direction).max(axis=1)
-        direction *= np.minimum(1.0, ASCENT_LONGEST_STEP / np.maximum(length, 1e-300))[:, None]
-        V = np.clip(U + t[:, None] * direction, low, high)
-        S = V - U
-        value, gradient = objective.with_gradient(V)
-        promised = np.einsum("ri,ri->r", G, S)
-        with np.errstate(invalid="ignore"):  # a value may be infinite
-            better = (value >= F + ASCENT_SUFFICIENT * promised) & np.isfinite(gradient).all(axis=1)
-        gain = np.where(better, value, F) - F
-        moved = np.abs(S).max(axis=1)
-        Y = G - np.where(better[:, None], gradient, G)
-        B, fresh = _updated(B, S, Y, better, fresh)
-        U, G = np.where(better[:, None], V, U), np.where(better[:, None], gradient, G)
-        F = F + gain
-        t = np.where(better, 1.0, ASCENT_SHORTEN * t)
-        points[alive], values[alive] = U, F
-        going = (moved > ASCENT_PRECISION) & ~(better & (gain <= ASCENT_PRECISION * (1.0 + np.abs(F))))
+        _propose(state)
+        value, gradient = objective.with_gradient(state.V)
+        going = _advance(state, np.ascontiguousarray(value), np.ascontiguousarray(gradient))
+        points[alive], values[alive] = state.U, state.F
         if not going.all():
-            alive, U, F, G, B = alive[going], U[going], F[going], G[going], B[going]
-            t, fresh, low, high = t[going], fresh[going], low[going], high[going]
+            alive, state = alive[going], _State._make(part[going] for part in state)
     return points, values
 
 
-def _scaled_identity(scales: NDArray[np.float64], d: int) -> NDArray[np.float64]:
-    return scales[:, None, None] * np.eye(d)
+class _State(NamedTuple):
+    """Where the starts that are still climbing are; plain arrays for compiled code, which writes into them."""
+
+    U: NDArray[np.float64]
+    F: NDArray[np.float64]
+    G: NDArray[np.float64]
+    B: NDArray[np.float64]
+    t: NDArray[np.float64]
+    fresh: NDArray[np.bool_]
+    """whether B is still without an update, (r,)"""
+    low: NDArray[np.float64]
+    """corners of their boxes, (r, d)"""
+    high: NDArray[np.float64]
+    V: NDArray[np.float64]
+    """points that are tried next, (r, d)"""
+
+    @classmethod
+    def at(
+        cls,
+        U: NDArray[np.float64],
+        F: NDArray[np.float64],
+        G: NDArray[np.float64],
+        low: NDArray[np.float64],
+        high: NDArray[np.float64],
+    ) -> "_State":
+        """Return the state of starts that have made no step."""
+        r, d = U.shape
+        scales = ASCENT_FIRST_STEP / np.maximum(np.abs(G).max(axis=1, initial=0.0), 1e-300)
+        return cls(U, F, G, scales[:, None, None] * np.eye(d), np.ones(r), np.ones(r, dtype=bool), low, high, U.copy())
 
 
-def _updated(
-    B: NDArray[np.float64],
-    S: NDArray[np.float64],
-    Y: NDArray[np.float64],
-    accepted: NDArray[np.bool_],
-    fresh: NDArray[np.bool_],
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return B after steps S (r, d) that changed the gradient by -Y (r, d), and which are still without an update."""
-    # c S and c Y give the same B. A power of two as c rounds nothing, and keeps 1 / s'y finite at steps of 1e-155.
-    exponent = (np.frexp(np.abs(S).max(axis=1))[1] + np.frexp(np.abs(Y).max(axis=1))[1]) // 2
-    S, Y = np.ldexp(S, -exponent[:, None]), np.ldexp(Y, -exponent[:, None])
-    sy = np.einsum("ri,ri->r", S, Y)
-    yy = np.einsum("ri,ri->r", Y, Y)
-    curved = accepted & (sy > 1e-12 * np.sqrt(yy) * np.abs(S).max(axis=1)) & (yy > 0.0) & np.isfinite(yy)
-    if not curved.any():
-        return B, fresh
-    sy, yy = np.where(curved, sy, 1.0), np.where(curved, yy, 1.0)
-    d = S.shape[1]
-    base = np.where((curved & fresh)[:, None, None], _scaled_identity(sy / yy, d), B)  # Nocedal and Wright (6.20)
-    BY = np.einsum("rij,rj->ri", base, Y)
-    outer = np.einsum("ri,rj->rij", S, BY)
-    factor = (1.0 + np.einsum("ri,ri->r", Y, BY) / sy) / sy
-    new = base + factor[:, None, None] * np.einsum("ri,rj->rij", S, S)
-    new -= (outer + np.swapaxes(outer, 1, 2)) / sy[:, None, None]
-    return np.where(curved[:, None, None], new, B), fresh & ~curved
+@njit(cache=True)
+def _propose(state):
+    """Fill V with the points that the next steps lead to."""
+    r, d = state.U.shape
+    held = np.empty(d, dtype=np.bool_)
+    direction = np.empty(d)
+    for i in range(r):
+        U, G, B, low, high = state.U[i], state.G[i], state.B[i], state.low[i], state.high[i]
+        for k in range(d):
+            held[k] = (low[k] >= U[k] and G[k] < 0.0) or (high[k] <= U[k] and G[k] > 0.0)
+        length = 0.0
+        for k in range(d):
+            direction[k] = 0.0
+            if not held[k]:
+                for o in range(d):
+                    if not held[o]:
+                        direction[k] += B[k, o] * G[o]
+                length = max(length, abs(direction[k]))
+        shortened = min(1.0, ASCENT_LONGEST_STEP / max(length, 1e-300))
+        for k in range(d):
+            state.V[i, k] = min(max(U[k] + state.t[i] * (shortened * direction[k]), low[k]), high[k])
+
+
+@njit(cache=True)
+def _advance(state, value, gradient):
+    """Take the steps that gain enough, shorten the others, and return which ascents go on (r,)."""
+    r, d = state.U.shape
+    going = np.empty(r, dtype=np.bool_)
+    S, Y, BY = np.empty(d), np.empty(d), np.empty(d)
+    for i in range(r):
+        U, G, V = state.U[i], state.G[i], state.V[i]
+        promised, moved, change = 0.0, 0.0, 0.0
+        finite = True
+        for k in range(d):
+            S[k] = V[k] - U[k]
+            promised += G[k] * S[k]
+            moved = max(moved, abs(S[k]))
+            finite = finite and isfinite(gradient[i, k])
+        better = finite and value[i] >= state.F[i] + ASCENT_SUFFICIENT * promised
+        gain = 0.0
+        if better:
+            gain = value[i] - state.F[i]
+            for k in range(d):
+                Y[k] = G[k] - gradient[i, k]
+                change = max(change, abs(Y[k]))
+                U[k] = V[k]
+                G[k] = gradient[i, k]
+            if _bend(state.B[i], S, Y, BY, moved, change, state.fresh[i]):
+                state.fresh[i] = False
+            state.F[i] += gain
+            state.t[i] = 1.0
+        else:
+            state.t[i] *= ASCENT_SHORTEN
+        settled = better and gain <= ASCENT_PRECISION * (1.0 + abs(state.F[i]))
+        going[i] = moved > ASCENT_PRECISION and not settled
+    return going
+
+
+@njit(cache=True)
+def _bend(B, S, Y, BY, largest_step, largest_change, fresh):
+    """Update B (d, d) after a step S (d,) that changed the gradient by -Y (d,); False if it tells nothing.
+
+    S and Y are scaled on the way: c S and c Y give the same B. A power of two as c rounds nothing, and keeps 1 / s'y
+    finite at steps of 1e-155. BY (d,) is room to work in.
+    """
+    d = S.size
+    exponent = (frexp(largest_step)[1] + frexp(largest_change)[1]) // 2
+    sy, yy = 0.0, 0.0
+    for k in range(d):
+        S[k], Y[k] = ldexp(S[k], -exponent), ldexp(Y[k], -exponent)
+        sy += S[k] * Y[k]
+        yy += Y[k] * Y[k]
+    if not (sy > 1e-12 * sqrt(yy) * ldexp(largest_step, -exponent) and yy > 0.0 and isfinite(yy)):
+        return False
+    if fresh:
+        B[:] = 0.0
+        for k in range(d):
+            B[k, k] = sy / yy  # Nocedal and Wright (6.20)
+    yBy = 0.0
+    for k in range(d):
+        BY[k] = 0.0
+        for o in range(d):
+            BY[k] += B[k, o] * Y[o]
+        yBy += Y[k] * BY[k]
+    factor = (1.0 + yBy / sy) / sy
+    for k in range(d):
+        for o in range(d):
+            B[k, o] += factor * S[k] * S[o] - (S[k] * BY[o] + S[o] * BY[k]) / sy
+    return True

@@ -1,4 +1,4 @@
-"""Cholesky factorization and triangular systems of small matrices (compiled).
+"""Cholesky factorization of small matrices (compiled).
 
 Legend: A (n, n) symmetric and positive definite, of which the lower triangle is read; L its lower Cholesky factor.
 For n up to a few hundred, calls of LAPACK from compiled code cost more than the arithmetic: `benchmarks.factorization`.
@@ -8,7 +8,7 @@ from math import sqrt
 
 from surehold.store.kernels import njit
 
-__all__ = ["cholesky", "invert_lower", "solve_lower", "solve_lower_transposed"]
+__all__ = ["cholesky"]
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
@@ -75,38 +75,3 @@ def cholesky(A):
             return False
         last[n - 1] = sqrt(pivot)
     return True
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def solve_lower(L, b):
-    """Overwrite b (n,) with L^-1 b."""
-    for i in range(b.size):
-        t = 0.0
-        for k in range(i):
-            t += L[i, k] * b[k]
-        b[i] = (b[i] - t) / L[i, i]
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def solve_lower_transposed(L, b):
-    """Overwrite b (n,) with L'^-1 b."""
-    for i in range(b.size - 1, -1, -1):
-        b[i] /= L[i, i]
-        t = b[i]
-        for k in range(i):
-            b[k] -= L[i, k] * t
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def invert_lower(L, inverse):
-    """Fill `inverse` (n, n) with the inverse of the lower triangular L (n, n), row by row from the rows above."""
-    inverse[:] = 0.0
-    for i in range(L.shape[0]):
-        diagonal = 1.0 / L[i, i]
-        row = inverse[i]
-        for k in range(i):
-            t = L[i, k] * diagonal
-            above = inverse[k]
-            for j in range(k + 1):
-                row[j] -= t * above[j]
-        row[i] = diagonal

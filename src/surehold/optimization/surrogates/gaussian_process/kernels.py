@@ -40,9 +40,12 @@ __all__ = [
     "TWO_SCALES",
     "along",
     "correlation_and_factor",
+    "correlations",
+    "correlations_and_factors",
     "cross_correlation",
     "kernel_number",
     "self_correlation",
+    "self_correlation_and_factor",
     "shape_size",
     "transposed",
     "two_scale_slopes",
@@ -127,11 +130,18 @@ def _transform_with_factor(kernel, squared, factor, scales):
 @njit(cache=True, fastmath={"contract"})
 def _squared_distances(x, Z, inverse_l, out):
     """Fill `out` (q,) with || (x - z_j) / l ||^2 for x (d,) and the columns z_j of Z (d, q) that `out` has room for."""
+    d = x.size
     out[:] = 0.0
-    for k in range(x.size):
-        scale = inverse_l[k]
+    for k in range(0, d - d % 2, 2):  # two dimensions at a time load and store the sums half as often
+        this, next_scale = inverse_l[k], inverse_l[k + 1]
         for j in range(out.size):
-            t = (x[k] - Z[k, j]) * scale
+            t = (x[k] - Z[k, j]) * this
+            u = (x[k + 1] - Z[k + 1, j]) * next_scale
+            out[j] += t * t + u * u
+    for k in range(d - d % 2, d):
+        this = inverse_l[k]
+        for j in range(out.size):
+            t = (x[k] - Z[k, j]) * this
             out[j] += t * t
 
 
@@ -166,17 +176,42 @@ def transposed(A):
 
 
 @njit(cache=True)
+def correlations(kernel, x, Z, inverse_l, out):
+    """Fill `out` (q,) with c(x, z_j) of x (d,) and the columns z_j of Z (d, q) that `out` has room for."""
+    if kernel == _PRODUCT:
+        _products(x, Z, inverse_l, out)
+    else:
+        _squared_distances(x, Z, inverse_l, out)
+        _transform(kernel, out, inverse_l)
+
+
+@njit(cache=True)
+def correlations_and_factors(kernel, x, Z, inverse_l, out, factor):
+    """Fill `out` (q,) as `correlations` does, and `factor` (q,) with the radial factor g of the module's legend."""
+    if kernel == _PRODUCT:
+        _products(x, Z, inverse_l, out)
+        for j in range(out.size):
+            factor[j] = out[j]
+    else:
+        _squared_distances(x, Z, inverse_l, out)
+        _transform_with_factor(kernel, out, factor, inverse_l)
+
+
+@njit(cache=True)
 def self_correlation(kernel, X, inverse_l, out):
     """Fill the strict lower triangle of `out` (n, n) with c(x_i, x_j) of X (n, d) and its diagonal with 1."""
     Z = transposed(X)
     for i in range(X.shape[0]):
-        row = out[i, :i]
-        if kernel == _PRODUCT:
-            _products(X[i], Z, inverse_l, row)
-        else:
-            _squared_distances(X[i], Z, inverse_l, row)
-            _transform(kernel, row, inverse_l)
+        correlations(kernel, X[i], Z, inverse_l, out[i, :i])
         out[i, i] = 1.0
+
+
+@njit(cache=True)
+def self_correlation_and_factor(kernel, X, inverse_l, out, factor):
+    """Fill the strict lower triangles of `out` and `factor` (n, n) with c(x_i, x_j) and g of X (n, d)."""
+    Z = transposed(X)
+    for i in range(X.shape[0]):
+        correlations_and_factors(kernel, X[i], Z, inverse_l, out[i, :i], factor[i, :i])
 
 
 @njit(cache=True)
@@ -184,11 +219,7 @@ def cross_correlation(kernel, X, Q, inverse_l, out):
     """Fill `out` (n, q) with c(x_i, q_j) of X (n, d) and Q (q, d)."""
     Z = transposed(Q)
     for i in range(X.shape[0]):
-        if kernel == _PRODUCT:
-            _products(X[i], Z, inverse_l, out[i])
-        else:
-            _squared_distances(X[i], Z, inverse_l, out[i])
-            _transform(kernel, out[i], inverse_l)
+        correlations(kernel, X[i], Z, inverse_l, out[i])
 
 
 @njit(cache=True)
@@ -196,13 +227,7 @@ def correlation_and_factor(kernel, X, Q, inverse_l, out, factor):
     """Fill `out` (n, q) with c(x_i, q_j) and `factor` (n, q) with the radial factor g of the module's legend."""
     Z = transposed(Q)
     for i in range(X.shape[0]):
-        if kernel == _PRODUCT:
-            _products(X[i], Z, inverse_l, out[i])
-            for j in range(out.shape[1]):
-                factor[i, j] = out[i, j]
-        else:
-            _squared_distances(X[i], Z, inverse_l, out[i])
-            _transform_with_factor(kernel, out[i], factor[i], inverse_l)
+        correlations_and_factors(kernel, X[i], Z, inverse_l, out[i], factor[i])
 
 
 @njit(cache=True)

@@ -27,12 +27,14 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from surehold.optimization.numerics.cholesky import cholesky, invert_lower, solve_lower
+from surehold.optimization.numerics.cholesky import cholesky
+from surehold.optimization.numerics.triangular import gram_of_lower, invert_lower, solve_lower, solve_lower_transposed
 from surehold.optimization.surrogates.gaussian_process.kernels import (
     TWO_SCALES,
     along,
-    correlation_and_factor,
     self_correlation,
+    self_correlation_and_factor,
+    transposed,
     two_scale_slopes,
 )
 from surehold.store.kernels import njit
@@ -187,13 +189,25 @@ def log_posterior(theta, evidence):
     return value
 
 
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _weighted_squares(kernel, x, Z, inverse_l, weights, gradient):
+    """Add the sums over j of weights h (x_k - Z_kj)^2 / l_k^2, for x (d,) and Z (d, q), to `gradient` (d,)."""
+    for k in range(x.size):
+        scale = inverse_l[k]
+        t = 0.0
+        for j in range(weights.size):
+            step = x[k] - Z[k, j]
+            t += weights[j] * along(kernel, step, scale) * (step * step)
+        gradient[k] += t * scale * scale
+
+
 @njit(cache=True)
 def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, gradient):
     """Return log p of one block and add its derivatives to `gradient` (d + 4,): log l, log s2, log v, shape."""
     n, d = X.shape
     C = np.empty((n, n))
     factor = np.empty((n, n))
-    correlation_and_factor(kernel, X, X, inverse_l, C, factor)
+    self_correlation_and_factor(kernel, X, inverse_l, C, factor)
     L = np.empty((n, n))
     for i in range(n):
         for j in range(i):
@@ -203,19 +217,24 @@ def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel,
         return -inf
     inverse = np.empty((n, n))
     invert_lower(L, inverse)
-    A_inverse = np.dot(inverse.T, inverse)
-    alpha = np.dot(A_inverse, y)
-    value = -0.5 * n * _LOG_2PI
+    alpha = np.empty(n)
     for i in range(n):
-        value -= 0.5 * y[i] * alpha[i] + log(L[i, i])
+        alpha[i] = y[i]
+    value = -0.5 * n * _LOG_2PI
+    solve_lower(L, alpha)
+    for i in range(n):
+        value -= 0.5 * alpha[i] * alpha[i] + log(L[i, i])
+    solve_lower_transposed(L, alpha)
+    A_inverse = L  # not needed any more
+    gram_of_lower(inverse, A_inverse)
+    Z = transposed(X)
+    weights = np.empty(n)
     for i in range(n):  # 1/2 tr((alpha alpha' - A^-1) dA/dtheta), GPML (5.9)
+        by_signal = 0.0
         for j in range(i):
             w = (alpha[i] * alpha[j] - A_inverse[i, j]) * s2  # the two symmetric entries together
-            for k in range(d):
-                step = X[i, k] - X[j, k]
-                t = step * inverse_l[k]
-                gradient[k] += w * factor[i, j] * along(kernel, step, inverse_l[k]) * t * t
-            gradient[d] += w * C[i, j]
+            by_signal += w * C[i, j]
+            weights[j] = w * factor[i, j]
             if kernel == TWO_SCALES:
                 squared = 0.0
                 for k in range(d):
@@ -224,8 +243,9 @@ def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel,
                 by_proportion, by_share = two_scale_slopes(squared, inverse_l[d], inverse_l[d + 1])
                 gradient[d + 2] += w * by_proportion
                 gradient[d + 3] += w * by_share
+        _weighted_squares(kernel, X[i], Z, inverse_l, weights[:i], gradient)
         w = 0.5 * (alpha[i] * alpha[i] - A_inverse[i, i])
-        gradient[d] += w * s2 * (1.0 + ratio)
+        gradient[d] += by_signal + w * s2 * (1.0 + ratio)
         gradient[d + 1] += w * v
     return value
 

@@ -51,7 +51,7 @@ class Factors(NamedTuple):
     """What every prediction needs of the data's covariance A = L L' under each particle."""
 
     inverse_L: NDArray[np.float64]
-    """(m, n, n)"""
+    """(m, n, n), lower triangular with zeros above the diagonal"""
     alpha: NDArray[np.float64]
     """A^-1 y, (m, n)"""
     repaired: int

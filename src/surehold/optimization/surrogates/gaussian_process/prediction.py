@@ -15,10 +15,19 @@ is f(x) itself, so one compiled function serves both.
 
 import numpy as np
 
-from surehold.optimization.numerics.cholesky import cholesky, invert_lower, solve_lower, solve_lower_transposed
+from surehold.optimization.numerics.cholesky import cholesky
+from surehold.optimization.numerics.triangular import (
+    invert_lower,
+    solve_lower,
+    solve_lower_transposed,
+    times_lower,
+    times_lower_transposed,
+)
 from surehold.optimization.surrogates.gaussian_process.kernels import (
     along,
     correlation_and_factor,
+    correlations,
+    correlations_and_factors,
     cross_correlation,
     transposed,
 )
@@ -57,34 +66,35 @@ def factorize(X, Y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, inver
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _weighted_sums(C, weights, out):
-    """Fill out (n, q) with the sums over s of weights (s,) times the columns of C (n, q s)."""
-    s = weights.size
-    for a in range(out.shape[0]):
-        for i in range(out.shape[1]):
-            t = 0.0
-            for w in range(s):
-                t += weights[w] * C[a, i * s + w]
-            out[a, i] = t
+def _add(row, factor, sums):
+    """Add factor times row (n,) to sums (n,)."""
+    for a in range(row.size):
+        sums[a] += factor * row[a]
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _weighted_slopes(kernel, F, X, Z, slopes, weights, k, scale, out):
-    """Fill out (n, q) with the sums over s of -weights g (z_k - x_k) slope, for radial factors F (n, q s).
+def _product(a, b):
+    """Return a'b of two vectors (n,); numpy.dot costs more for so few numbers."""
+    t = 0.0
+    for i in range(a.size):
+        t += a[i] * b[i]
+    return t
 
-    Z (d, q s) are the perturbed points, slopes (d, q s) their derivatives by the query, scale the inverse length-scale
-    of dimension k.
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _slopes(kernel, factor, z, Z, k, scale, first, second):
+    """Return the sums over trials a of -g_a (z - Z_ka) times first (n,), and times second (n,).
+
+    factor (n,) are the radial factors g, z is coordinate k of the point, Z (d, n) are the trials, scale is the inverse
+    length-scale of dimension k.
     """
-    s = weights.size
-    for a in range(out.shape[0]):
-        x = X[a, k]
-        for i in range(out.shape[1]):
-            t = 0.0
-            for w in range(s):
-                c = i * s + w
-                step = Z[k, c] - x
-                t -= weights[w] * F[a, c] * along(kernel, step, scale) * step * slopes[k, c]
-            out[a, i] = t
+    t = u = 0.0
+    for a in range(factor.size):
+        step = Z[k, a] - z
+        slope = factor[a] * along(kernel, step, scale) * step
+        t += slope * first[a]
+        u += slope * second[a]
+    return t, u
 
 
 @njit(cache=True)
@@ -98,23 +108,20 @@ def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel
     q, d = Q.shape
     s = weights.size
     last = offsets.shape[0] - 1
-    points = np.empty((q * s, d))
-    slope = np.ones((d, q * s if gradient else 0))
+    points = np.empty((q, s, d))
     for i in range(q):
         for w in range(s):
             for k in range(d):
-                points[i * s + w, k] = Q[i, k] + offsets[min(i, last), w, k]
-                if gradient:
-                    slope[k, i * s + w] = slopes[min(i, last), w, k]
-    Z = transposed(points)
-    mean = np.zeros((m, q))
+                points[i, w, k] = Q[i, k] + offsets[min(i, last), w, k]
+    Z = transposed(X)
+    mean = np.empty((m, q))
     variance = np.empty((m, q))
     mean_gradient = np.zeros((m, q if gradient else 0, d))
     variance_gradient = np.zeros((m, q if gradient else 0, d))
-    C = np.empty((n, q * s))
-    F = np.empty((n, q * s if gradient else 0))
-    K = np.empty((n, q))
-    D = np.empty((n, q if gradient else 0))
+    C = np.empty(n)
+    F = np.empty((q if gradient else 0, s, n))
+    K, V = np.empty((q, n)), np.empty((q, n))
+    W = np.empty((q if gradient else 0, n))
     own = np.empty((s, s))
     own_factor = np.empty((s, s))
     shift = mean_variance * weights.sum()
@@ -136,27 +143,28 @@ def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel
                             step *= (slopes[b, w, k] - slopes[b, o, k]) * along(kernel, step, inverse_l[j, k])
                             t -= weights[w] * weights[o] * own_factor[w, o] * step
                     variance_gradient[j, b:, k] = s2[j] * t * inverse_l[j, k] ** 2
+        K[:] = shift
+        for i in range(q):
+            for w in range(s):
+                if gradient:
+                    correlations_and_factors(kernel, points[i, w], Z, inverse_l[j], C, F[i, w])
+                else:
+                    correlations(kernel, points[i, w], Z, inverse_l[j], C)
+                _add(C, s2[j] * weights[w], K[i])
+        times_lower(inverse_L[j], K, V)
+        for i in range(q):
+            mean[j, i] = _product(alpha[j], K[i])
+            variance[j, i] -= _product(V[i], V[i])
         if gradient:
-            correlation_and_factor(kernel, X, points, inverse_l[j], C, F)
-        else:
-            cross_correlation(kernel, X, points, inverse_l[j], C)
-        _weighted_sums(C, s2[j] * weights, K)
-        if shift != 0.0:
-            K += shift
-        V = np.dot(inverse_L[j], K)
-        for a in range(n):
+            times_lower_transposed(inverse_L[j], V, W)
             for i in range(q):
-                mean[j, i] += alpha[j, a] * K[a, i]
-                variance[j, i] -= V[a, i] * V[a, i]
-        if gradient:
-            W = np.dot(inverse_L[j].T, V)
-            for k in range(d):
-                scale = inverse_l[j, k]
-                _weighted_slopes(kernel, F, X, Z, slope, s2[j] * scale**2 * weights, k, scale, D)
-                for a in range(n):
-                    for i in range(q):
-                        mean_gradient[j, i, k] += alpha[j, a] * D[a, i]
-                        variance_gradient[j, i, k] -= 2.0 * W[a, i] * D[a, i]
+                for w in range(s):
+                    for k in range(d):
+                        scale = inverse_l[j, k]
+                        t, u = _slopes(kernel, F[i, w], points[i, w, k], Z, k, scale, alpha[j], W[i])
+                        rate = s2[j] * scale**2 * weights[w] * slopes[min(i, last), w, k]
+                        mean_gradient[j, i, k] += rate * t
+                        variance_gradient[j, i, k] -= 2.0 * rate * u
     return mean, np.maximum(variance, 0.0), mean_gradient, variance_gradient
 
 

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from surehold.optimization.numerics.cholesky import cholesky, solve_lower
+from surehold.optimization.numerics.cholesky import cholesky
+from surehold.optimization.numerics.triangular import solve_lower
 from surehold.optimization.surrogates.gaussian_process.kernels import correlation_and_factor, self_correlation
 from surehold.store.kernels import njit
 

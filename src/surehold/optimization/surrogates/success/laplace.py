@@ -20,7 +20,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.optimization.numerics.cholesky import cholesky, solve_lower, solve_lower_transposed
+from surehold.optimization.numerics.cholesky import cholesky
+from surehold.optimization.numerics.triangular import solve_lower, solve_lower_transposed
 from surehold.optimization.surrogates.gaussian_process.likelihood import data_covariance
 from surehold.store.kernels import njit
 

@@ -157,6 +157,6 @@ def _utility(counts: Counts, theta: NDArray[np.float64], cost: int) -> GaussianP
     half, alpha = np.zeros((len(theta), n, n)), np.empty((len(theta), n))
     for j, one in enumerate(theta):
         sites = sites_of(counts, one)
-        triangle = np.linalg.qr(sites.half @ A, mode="r")  # of the same square, of n rows at most
-        half[j, : len(triangle)], alpha[j] = triangle, A.T @ sites.alpha
+        triangle = np.linalg.qr((sites.half @ A)[:, ::-1], mode="r")  # upper, of the same square, of n rows at most
+        half[j, n - len(triangle) :], alpha[j] = np.flip(triangle), A.T @ sites.alpha
     return regression(counts, theta, cost, Factors(half, alpha, 0))

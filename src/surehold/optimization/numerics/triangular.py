@@ -1,0 +1,153 @@
+"""Products, inverses and solutions with small lower triangular matrices (compiled).
+
+Legend: L, T (n, n) lower triangular; of L the lower triangle alone is read, T holds zeros above its diagonal. Vectors
+stand in rows, so that every inner loop runs along memory. Blocks of rows are taken together, since a number that is
+loaded once then serves several sums. For n up to a few hundred, calls of BLAS from compiled code cost more, and they
+multiply the zeros as well: `benchmarks.factorization`.
+"""
+
+from surehold.store.kernels import njit
+
+__all__ = [
+    "gram_of_lower",
+    "invert_lower",
+    "solve_lower",
+    "solve_lower_transposed",
+    "times_lower",
+    "times_lower_transposed",
+]
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def solve_lower(L, b):
+    """Overwrite b (n,) with L^-1 b."""
+    for i in range(b.size):
+        t = 0.0
+        for k in range(i):
+            t += L[i, k] * b[k]
+        b[i] = (b[i] - t) / L[i, i]
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def solve_lower_transposed(L, b):
+    """Overwrite b (n,) with L'^-1 b."""
+    for i in range(b.size - 1, -1, -1):
+        b[i] /= L[i, i]
+        t = b[i]
+        for k in range(i):
+            b[k] -= L[i, k] * t
+
+
+@njit(cache=True, fastmath={"contract"})
+def invert_lower(L, inverse):
+    """Fill `inverse` (n, n) with the inverse of L, zeros above its diagonal, row by row from the rows above."""
+    inverse[:] = 0.0
+    for i in range(L.shape[0]):
+        diagonal = 1.0 / L[i, i]
+        row = inverse[i]
+        k = 0
+        while k + 4 <= i:
+            t, u, v, w = L[i, k] * diagonal, L[i, k + 1] * diagonal, L[i, k + 2] * diagonal, L[i, k + 3] * diagonal
+            a, b, c, d = inverse[k], inverse[k + 1], inverse[k + 2], inverse[k + 3]
+            for j in range(k + 4):
+                row[j] -= t * a[j] + u * b[j] + v * c[j] + w * d[j]
+            k += 4
+        for rest in range(k, i):
+            t = L[i, rest] * diagonal
+            a = inverse[rest]
+            for j in range(rest + 1):
+                row[j] -= t * a[j]
+        row[i] = diagonal
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def times_lower(T, K, out):
+    """Fill row i of `out` (q, n) with T times row i of K (q, n)."""
+    q, n = K.shape
+    even = n - n % 2
+    i = 0
+    while i + 4 <= q:
+        a, b, c, d = K[i], K[i + 1], K[i + 2], K[i + 3]
+        for r in range(0, even, 2):
+            u, v = T[r], T[r + 1]
+            au = bu = cu = du = av = bv = cv = dv = 0.0
+            for k in range(r + 2):
+                au += a[k] * u[k]
+                bu += b[k] * u[k]
+                cu += c[k] * u[k]
+                du += d[k] * u[k]
+                av += a[k] * v[k]
+                bv += b[k] * v[k]
+                cv += c[k] * v[k]
+                dv += d[k] * v[k]
+            out[i, r], out[i + 1, r], out[i + 2, r], out[i + 3, r] = au, bu, cu, du
+            out[i, r + 1], out[i + 1, r + 1], out[i + 2, r + 1], out[i + 3, r + 1] = av, bv, cv, dv
+        for r in range(even, n):
+            u = T[r]
+            au = bu = cu = du = 0.0
+            for k in range(n):
+                au += a[k] * u[k]
+                bu += b[k] * u[k]
+                cu += c[k] * u[k]
+                du += d[k] * u[k]
+            out[i, r], out[i + 1, r], out[i + 2, r], out[i + 3, r] = au, bu, cu, du
+        i += 4
+    for rest in range(i, q):
+        a = K[rest]
+        for r in range(0, even, 2):
+            u, v = T[r], T[r + 1]
+            au = av = 0.0
+            for k in range(r + 2):
+                au += a[k] * u[k]
+                av += a[k] * v[k]
+            out[rest, r], out[rest, r + 1] = au, av
+        for r in range(even, n):
+            u = T[r]
+            au = 0.0
+            for k in range(n):
+                au += a[k] * u[k]
+            out[rest, r] = au
+
+
+@njit(cache=True, fastmath={"contract"})
+def times_lower_transposed(T, V, out):
+    """Fill row i of `out` (q, n) with T' times row i of V (q, n)."""
+    q, n = V.shape
+    out[:] = 0.0
+    whole = n - n % 4
+    for r in range(0, whole, 4):
+        a, b, c, d = T[r], T[r + 1], T[r + 2], T[r + 3]
+        for i in range(q):
+            t, u, v, w = V[i, r], V[i, r + 1], V[i, r + 2], V[i, r + 3]
+            o = out[i]
+            for k in range(r + 4):
+                o[k] += t * a[k] + u * b[k] + v * c[k] + w * d[k]
+    for r in range(whole, n):
+        a = T[r]
+        for i in range(q):
+            t = V[i, r]
+            o = out[i]
+            for k in range(r + 1):
+                o[k] += t * a[k]
+
+
+@njit(cache=True, fastmath={"contract"})
+def gram_of_lower(T, out):
+    """Fill the lower triangle of `out` (n, n) with that of T' T; above its diagonal `out` holds nothing of use."""
+    n = T.shape[0]
+    out[:] = 0.0
+    whole = n - n % 4
+    for r in range(0, whole, 4):
+        a, b, c, d = T[r], T[r + 1], T[r + 2], T[r + 3]
+        for i in range(r + 4):
+            t, u, v, w = a[i], b[i], c[i], d[i]
+            o = out[i]
+            for k in range(i + 1):
+                o[k] += t * a[k] + u * b[k] + v * c[k] + w * d[k]
+    for r in range(whole, n):
+        a = T[r]
+        for i in range(r + 1):
+            t = a[i]
+            o = out[i]
+            for k in range(i + 1):
+                o[k] += t * a[k]
