@@ -4,17 +4,17 @@ Runs the table-4.1 plan's RKHS and GF cells with the defaults, first by one work
 """
 
 import resource
-import sys
 import tempfile
 import time
 from pathlib import Path
 
+from benchmarks.arguments import chosen
 from surehold.campaigns.plan_file import load_plan
 from surehold.campaigns.runner import run_campaign
 
 
 def main():
-    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+    [runs] = chosen(__doc__, [20], name="runs")
     plan = load_plan("table-4.1-defaults")
     seconds = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -5,14 +5,14 @@ wall time without the start of the processes. Then the quality of the middle one
 noise of the pose, 100 trials, in one process and in two.
 """
 
-import sys
 import time
 
 import numba
 import numpy as np
 from scipy.stats import qmc
 
-from surehold.grasping import grasp_batch
+from benchmarks.arguments import chosen
+from surehold.grasping import OBJECTS, grasp_batch
 from surehold.grasping.object.distance_field import field_distance
 from surehold.grasping.pose_noise import robust_quality
 from surehold.optimization.numerics.threads import single_threaded
@@ -67,7 +67,7 @@ def rows(name: str = "mug", poses: int = POSES):
 
 
 def main():
-    for name, seconds in rows(*sys.argv[1:2]):
+    for name, seconds in rows(chosen(__doc__, ["mug"], OBJECTS)[0]):
         rate = f"{60.0 / seconds:12,.0f} a minute" if name.startswith("graded") else ""
         print(f"{name:50} {1e3 * seconds:9.2f} ms{rate}", flush=True)
 

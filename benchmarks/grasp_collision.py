@@ -7,11 +7,11 @@ means over the seeds with standard errors, the paired difference, and the share 
 how many trials earlier the mean with the penalty reaches what the mean without it has at the last check.
 """
 
-import sys
-
 import numpy as np
 
 import surehold as sh
+from benchmarks.arguments import chosen
+from surehold.grasping import OBJECTS
 from surehold.optimization.numerics.threads import single_threaded
 
 SEEDS, INITIAL, CHECKS = 30, 20, (30, 40, 50, 60, 70, 80)
@@ -53,4 +53,4 @@ def main(names):
 
 if __name__ == "__main__":
     with single_threaded():
-        main(sys.argv[1:] or ("mug", "bottle"))
+        main(chosen(__doc__, ["mug", "bottle"], OBJECTS))

@@ -6,12 +6,12 @@ squeezed, weighed and shaken in MuJoCo. Printed: share of the verdicts in each r
 the grasps at or above each threshold, the rank correlation of quality with being held, and seconds a check.
 """
 
-import sys
 import time
 
 import numpy as np
 from scipy.stats import spearmanr
 
+from benchmarks.arguments import chosen
 from surehold.grasping import OBJECTS
 from surehold.grasping.physics.check import GraspChecker
 from surehold.optimization.numerics.threads import single_threaded
@@ -57,4 +57,4 @@ def main(names):
 
 if __name__ == "__main__":
     with single_threaded():
-        main(sys.argv[1:] or OBJECTS)
+        main(chosen(__doc__, OBJECTS))

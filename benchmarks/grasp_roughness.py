@@ -7,7 +7,7 @@ neighbors that both start free of collision. In percent of the mean quality of t
 The figure shows the middle line of each object: what Figure 4.7 of the thesis shows, with the three contact models.
 """
 
-import sys
+import argparse
 
 import numpy as np
 
@@ -77,7 +77,9 @@ def draw(names, drawn, path):
 
 
 if __name__ == "__main__":
-    words = sys.argv[1:]
-    target = words.pop(words.index("--figure") + 1) if "--figure" in words else None
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("objects", nargs="*", metavar="object", help=", ".join(OBJECTS))
+    parser.add_argument("--figure", help="file for the figure, as SVG")
+    told = parser.parse_args()
     with single_threaded():
-        main([word for word in words if word != "--figure"] or list(OBJECTS), target)
+        main(told.objects or list(OBJECTS), told.figure)

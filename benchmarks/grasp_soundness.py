@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.arguments import chosen
 from surehold.grasping import MODES, OBJECTS, Simulator, default_pose, grasp_batch
 from surehold.optimization.numerics.threads import single_threaded
 
@@ -73,8 +74,8 @@ def closing(names):
 
 if __name__ == "__main__":
     parts = {"trials": trials, "closing": closing}
-    chosen = [part for part in parts if part in sys.argv[1:]] or list(parts)
-    objects = [name for name in sys.argv[1:] if name not in parts] or list(OBJECTS)
+    told = chosen(__doc__, [*parts, *OBJECTS], name="part or object")
+    objects = [name for name in told if name not in parts] or list(OBJECTS)
     with single_threaded():
-        for part in chosen:
+        for part in [part for part in told if part in parts] or parts:
             parts[part](objects)

@@ -4,12 +4,12 @@ Prints for each object and contact model the median and 95th percentile of the C
 poses of a Latin hypercube over dx and dy and for those that do not start in collision, and the share of each status.
 """
 
-import sys
 import time
 
 import numpy as np
 from scipy.stats import qmc
 
+from benchmarks.arguments import chosen
 from surehold.grasping import CONTACT_MODELS, OBJECTS, STATUSES
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.problems import GraspProblem
@@ -46,4 +46,4 @@ def main(names):
 
 if __name__ == "__main__":
     with single_threaded():
-        main(sys.argv[1:] or OBJECTS)
+        main(chosen(__doc__, OBJECTS))

@@ -14,6 +14,7 @@ from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 import surehold as sh
+from benchmarks.arguments import chosen
 from benchmarks.suggestion_time import response
 
 SIZES = (300, 1000, 3000, 10000)
@@ -58,7 +59,7 @@ def rows(sizes=SIZES):
 
 def main():
     print(f"{'':32} {'cold s':>10} {'warm s':>10} {'MB':>8}")
-    for name, (cold, warm, memory) in rows([int(n) for n in sys.argv[1:]] or SIZES):
+    for name, (cold, warm, memory) in rows(chosen(__doc__, SIZES, name="n")):
         print(f"{name:32} {cold:10.3f} {warm:10.3f} {memory:8.0f}", flush=True)
 
 

@@ -7,12 +7,12 @@ paired on common seeds. The functions' values under noise are closed-form; the g
 that are no part of the budget, the same perturbations for all answers.
 """
 
-import sys
 import time
 
 import numpy as np
 
 import surehold as sh
+from benchmarks.arguments import chosen
 
 
 def summary(values):
@@ -87,5 +87,5 @@ def mug(seeds=10):
 
 if __name__ == "__main__":
     parts = {"thesis": thesis, "gm": gm, "mug": mug}
-    for part in sys.argv[1:] or parts:
+    for part in chosen(__doc__, parts, name="part"):
         parts[part]()

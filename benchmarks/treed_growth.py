@@ -14,6 +14,7 @@ from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 import surehold as sh
+from benchmarks.arguments import chosen
 from benchmarks.suggestion_time import response, yardstick
 
 SIZES = (100, 300, 1000, 3000, 10000)
@@ -46,7 +47,7 @@ def measure(n, noise):
 
 
 def main():
-    sizes = [int(n) for n in sys.argv[1:]] or SIZES
+    sizes = chosen(__doc__, SIZES, name="n")
     with threadpool_limits(1):
         print(f"yardstick: dpotrf 140 x 140 takes {1e3 * yardstick():.3f} ms")
     print(f"{'':12} {'n':>8} {'leaves':>8} {'cold s':>12} {'warm s':>12} {'MB':>12}")

@@ -13,7 +13,6 @@ to `ours`, the largest difference of epsilon, and the sets in closure.
 """
 
 import os
-import sys
 from statistics import median
 from time import thread_time
 
@@ -22,6 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from benchmarks.arguments import chosen
 from surehold.grasping.wrench.force_closure import force_closure
 from surehold.grasping.wrench.friction_cones import contact_wrenches
 from surehold.grasping.wrench.hull.inscribed_ball import ball_radius
@@ -119,8 +119,8 @@ def main():
 
 
 if __name__ == "__main__":
-    chosen = sys.argv[1:] or ["time", "closure"]
-    if "closure" in chosen:
+    parts = chosen(__doc__, ["time", "closure"], name="part")
+    if "closure" in parts:
         closure()
-    if "time" in chosen:
+    if "time" in parts:
         main()

@@ -1,5 +1,6 @@
 import inspect
 import io
+import math
 import sys
 from html import escape
 
@@ -223,6 +224,11 @@ def test_a_type_error_inside_the_function_is_a_failed_trial():
 
     result = maximize(moody, BOX, n_trials=8, n_initial=8, seed=1)
     assert {trial.failure for trial in result.trials} == {"", "TypeError: no grip"}
+
+
+def test_an_array_where_one_number_was_expected_is_said():
+    with pytest.raises(SureholdError, match=r"TypeError.*; x has shape \(1,\), take x\[0\]"):
+        maximize(lambda x: math.sin(x), Box.unit(1), n_trials=5)
 
 
 def test_three_failures_in_a_row_after_a_success_are_no_reason_to_give_up():

@@ -17,6 +17,7 @@ from surehold.optimization.values import LARGEST
 __all__ = ["Evaluation", "evaluate", "in_processes", "one_by_one"]
 
 _NOTICED = 10.0  # s
+_NOT_ONE_NUMBER = "can be converted to Python scalars"  # NumPy's words where math.sin(x) is called with an array
 
 
 class Evaluation(NamedTuple):
@@ -49,7 +50,8 @@ def evaluate(f: Callable[[Any], Any], x: NDArray[np.float64] | dict[str, Any]) -
         if isinstance(error, TypeError) and _in_the_call(error.__traceback__):
             what = f"dictionary of {', '.join(x)}" if isinstance(x, dict) else f"array x of shape {x.shape}"
             raise InputError(f"the function cannot be called with one {what}: {error}.") from None
-        return np.nan, f"{type(error).__name__}: {error}", {}
+        hint = "" if isinstance(x, dict) or _NOT_ONE_NUMBER not in str(error) else f"; x has shape {x.shape}, take x[0]"
+        return np.nan, f"{type(error).__name__}: {error}{hint}", {}
     outputs: Mapping[str, Any] = {}
     if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], Mapping):
         value, outputs = value
