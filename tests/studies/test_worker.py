@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from optuna.trial import TrialState
 
 import surehold as sh
@@ -148,3 +149,19 @@ def test_a_lifetime_must_be_positive(study):
     with pytest.raises(InputError, match="lifetime"):
         work(study, attempt(lambda x: x[0]), lifetime=0.0)
     assert sys.modules["surehold.studies.worker"].LIFETIME > 0.0
+
+
+def test_files_of_a_problem_are_found_from_another_folder(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    Path("rig.py").write_text("def score(x):\n    return 3.0 * x[0]\n")
+    trimesh.creation.box((0.06, 0.06, 0.12)).export("part.obj")
+    storage = str(tmp_path / "journal.log")
+    RobotStudy.create("f", StudySettings(SPACE, problem={"function": "rig.py:score"}), storage)
+    RobotStudy.create("g", StudySettings(SPACE, problem={"grasp": {"object": "part.obj", "unit": "m"}}), storage)
+    monkeypatch.chdir(tmp_path)
+    assert problem_of(RobotStudy.open("f", storage).settings)(np.array([0.5])) == 1.5
+    problem = problem_of(RobotStudy.open("g", storage).settings)
+    assert problem.simulator.object.name == "part"
+    monkeypatch.chdir(tmp_path / "here")  # the same study, told the same again
+    RobotStudy.create("f", StudySettings(SPACE, problem={"function": "rig.py:score"}), storage, resume=True)

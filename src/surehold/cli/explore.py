@@ -115,9 +115,6 @@ def _created(study: str, storage: str, described: dict[str, Any], box: str, goal
             words["box"] = [float(word) for word in box.split(",")]
         except ValueError:
             raise InputError(f"--box is {box!r}; give three edges x,y,z in meters, such as 0.08,0.06,0.12.") from None
-    for name in ("cloud", "contacts", "hand", "hand_config", "preshape"):
-        if Path(words[name]).suffix:  # a file: it is found from any folder
-            words[name] = str(Path(words[name]).resolve())
     quiet()
     problem = TouchedShape(words, noise, seed).problem
     words["facet"] = problem.facet

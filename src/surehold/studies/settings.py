@@ -5,6 +5,7 @@ Written into the study when it is created; whoever opens the study later works w
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +22,8 @@ __all__ = ["SETTINGS", "StudySettings"]
 #: Study attribute that holds the settings.
 SETTINGS: Final = "surehold:settings"
 _VERSION: Final = 1
+#: Options of a grasp that name a file, where they have a suffix.
+_FILES: Final = ("object", "cloud", "contacts", "hand", "hand_config", "preshape")
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,8 @@ class StudySettings:
     optimizer: Mapping[str, Any] = field(default_factory=dict)
     """further settings of `Sampler`: seed, surrogate, criterion, n_initial, risk, ...; plain data, or a `Risk`"""
     problem: Mapping[str, Any] = field(default_factory=dict)
-    """what a worker tries, as plain data; empty where a robot makes the trials"""
+    """what a worker tries, as plain data; empty where a robot makes the trials. Paths of files become absolute, so that
+    workers find them from any folder"""
     direction: str = "maximize"
     """of the values: "maximize" or "minimize"."""
 
@@ -43,6 +47,7 @@ class StudySettings:
             raise unknown_name("direction", self.direction, ("maximize", "minimize"))
         if self.direction == "minimize" and self.optimizer.get("outcome", "value") != "value":
             raise InputError("direction='minimize' is of values; where trials succeed or fail, success is maximized.")
+        object.__setattr__(self, "problem", _found_from_anywhere(self.problem))
         _noise_to_json(self.input_noise, self.space)
         for name in self.units:
             if name not in self.space.distributions:
@@ -124,6 +129,21 @@ class StudySettings:
                 f"input noise: {_short(mine['input_noise'])} in the study, {_short(theirs['input_noise'])} now"
             )
         return found
+
+
+def _found_from_anywhere(problem: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the description of a problem with absolute paths."""
+    found = dict(problem)
+    place, _, name = str(found.get("function", "")).rpartition(":")
+    if place.endswith(".py"):
+        found["function"] = f"{Path(place).resolve()}:{name}"
+    for kind in ("grasp", "touch"):
+        words = dict(found.get(kind, {}))
+        for option in _FILES:
+            if Path(words.get(option) or "").suffix:
+                words[option] = str(Path(words[option]).resolve())
+        found |= {kind: words} if words else {}
+    return found
 
 
 def _short(value: Any) -> str:
