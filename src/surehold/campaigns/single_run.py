@@ -45,6 +45,8 @@ def run_once(cell: Cell, seed: int) -> dict[str, Any]:
         with single_threaded():
             row |= {"status": "done", **_Run(cell, seed).finish()}
     except Exception as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C in compiled code, as a SystemError
+            raise KeyboardInterrupt from None
         row |= {"status": "failed", "error": f"{type(error).__name__}: {error}"}
     row |= {"cpu_seconds": round(process_time() - cpu, 3), "seconds": round(perf_counter() - started, 3)}
     return row | {"settings": cell.as_data(), "versions": versions()}

@@ -18,6 +18,7 @@ from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.poses import Pose
 from surehold.grasping.wrench.quality import Measure
+from surehold.store.uninterrupted import uninterrupted
 
 __all__ = ["Simulator"]
 
@@ -131,6 +132,7 @@ class Simulator:
         self.model: Final[int] = CONTACT_MODELS.index(contact)  #: the contact model for compiled functions
         self._no_contacts: Final = as_contacts(np.empty((0, 8)), self.hand)
 
+    @uninterrupted()
     def grasp(self, pose: Pose, s1: float | tuple[float, ...] = 0.0) -> Grasp:
         """Close the hand at a pose of its palm in the world with posture s1 [rad]; a bad grasp has quality 0.
 

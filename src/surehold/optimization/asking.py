@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from surehold.optimization.assembly import Parts
 from surehold.optimization.box import Box
-from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.numerics.threads import computing
 from surehold.optimization.requirements import Requirements
 from surehold.optimization.strategy.ranking import History
 from surehold.optimization.surrogates.protocol import Posterior
@@ -53,7 +53,7 @@ class Asking:
         elif not trials.successful.any():
             u = self._anywhere(trials, rng)  # every trial failed or is pending: keep covering
         else:
-            with single_threaded():
+            with computing():
                 u = self._proposed(trials, posterior, rng)
         u = self._snapped(u)
         return self._box.uncontrolled.at_mean(u) if self._measured and self._box.uncontrolled is not None else u

@@ -23,7 +23,7 @@ from surehold.optimization.lattice import LatticePosterior
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
-from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.numerics.threads import computing
 from surehold.optimization.recommendation import Recommendation, recommendation
 from surehold.optimization.record import Record
 from surehold.optimization.strategy.promise import promise
@@ -306,7 +306,7 @@ class Optimizer(Record):
         if where not in ("observed", "box"):
             raise unknown_name("place of the recommendation", where, ("observed", "box"))
         history, ranking = self._history, self._ranking
-        with single_threaded():
+        with computing():
             posterior = self.posterior
             if not len(history.tried) and self._requirements is not None:
                 where, history = "observed", self._requirements.nearest(self._trials)
@@ -356,7 +356,7 @@ class Optimizer(Record):
         """
         U = np.atleast_2d(self.box.to_unit(X))
         perturbations = self._ranking.accurate if under_noise else Perturbations(exact(self.box.dimension))
-        with single_threaded():
+        with computing():
             mean, variance = mixture(perturbations.outcome(self.posterior, U))
         return self._sign * mean, np.sqrt(variance)
 
@@ -384,7 +384,7 @@ class Optimizer(Record):
         Of the outcome under the input noise, over the best input tried so far; small where there is little left to
         find, infinite where no trial may become the answer yet. Raises InputError if no trial has given a value yet.
         """
-        with single_threaded():
+        with computing():
             return promise(self._ranking, self.posterior, self._history, self._rng(4, len(self._trials)))
 
     @property

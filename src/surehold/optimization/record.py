@@ -18,7 +18,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.numerics.threads import computing
 from surehold.optimization.points import column_of
 from surehold.optimization.success import counted
 from surehold.optimization.trials import AskedTrial, Trials
@@ -233,7 +233,7 @@ class Record(ABC):
         told, reported = self._trials.successful, self._trials.reported
         if reported.any():
             return noise_from_reached(self.box, self._trials.commanded[reported], self._trials.reached[reported])
-        with single_threaded():
+        with computing():
             return noise_from_repeats(self._trials.commanded[told], self._trials.values[told])
 
     def save(self, path: str | os.PathLike[str]) -> None:

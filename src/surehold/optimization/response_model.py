@@ -11,7 +11,7 @@ from surehold.optimization.diagnosis import Diagnosis, diagnosis
 from surehold.optimization.lattice import Lattice, LatticePosterior
 from surehold.optimization.low_tail import LowTail, low_tail_of
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.numerics.threads import computing
 from surehold.optimization.strategy.thesis import ThesisConstants
 from surehold.optimization.surrogates.gaussian_process.model import learnt_from
 from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
@@ -130,7 +130,7 @@ class ResponseModel:
         k = learnt_from(int(told.sum()))
         if self._low_tail is None or self._low_tail[0] != k:
             background.wait()
-            with single_threaded():
+            with computing():
                 self._low_tail = k, low_tail_of(trials.reached[told], trials.modelled[told])
         return self._low_tail[1]
 
@@ -141,7 +141,7 @@ class ResponseModel:
         if kind in self._cache and self._cache[kind][0] == t:
             return self._cache[kind][1]
         background.wait()
-        with single_threaded():
+        with computing():
             posterior = self._conditioned(trials, tail)
         if self._lattice is not None:
             posterior = LatticePosterior(posterior, self._lattice)

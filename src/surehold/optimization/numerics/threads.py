@@ -10,7 +10,9 @@ from functools import cache
 
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["single_threaded"]
+from surehold.store.uninterrupted import uninterrupted
+
+__all__ = ["computing", "single_threaded"]
 
 
 @cache
@@ -24,4 +26,11 @@ def _controller() -> ThreadpoolController:
 def single_threaded() -> Iterator[None]:
     """Limit linear algebra to one thread inside a `with` block."""
     with _controller().limit(limits=1, user_api="blas"):
+        yield
+
+
+@contextmanager
+def computing() -> Iterator[None]:
+    """Do as `single_threaded`; Ctrl-C waits for the end of the block. For what runs no code of the user."""
+    with uninterrupted(), single_threaded():
         yield

@@ -19,7 +19,7 @@ from surehold.defaults import (
     SURPRISE,
 )
 from surehold.errors import InputError
-from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.numerics.threads import computing
 from surehold.optimization.surrogates.gaussian_process.heteroscedastic import most_likely_noise
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
     Learning,
@@ -349,7 +349,7 @@ class GaussianProcess:
         """
         inputs, outputs = checked_data(X, y)
         known = None if noise is None else checked_noise(noise, len(outputs))
-        with single_threaded():
+        with computing():
             self._posterior = self.condition(inputs, outputs, np.random.default_rng(seed), noise=known)
         return self
 
@@ -363,7 +363,7 @@ class GaussianProcess:
     def predict(self, X: ArrayLike, return_std: bool = False):
         """Return the mean (q,) at X (q, d), and the standard deviation (q,) of the latent function where asked for."""
         queries, _ = checked_data(X, None, self.posterior.evidence.X.shape[1])
-        with single_threaded():
+        with computing():
             mean, variance = mixture(self.posterior.moments(queries))
         return (mean, np.sqrt(variance)) if return_std else mean
 

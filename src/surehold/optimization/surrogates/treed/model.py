@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.defaults import LEAF_MARGIN, LEAF_SIZES, MIN_LEAF, UNDIVIDED, WIDEST_LEAF_MARGIN
 from surehold.errors import InputError
-from surehold.optimization.numerics.threads import single_threaded
+from surehold.optimization.numerics.threads import computing
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.gaussian_process.observations import checked_data, checked_noise
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
@@ -243,7 +243,7 @@ class TreedGaussianProcess:
         if seed is not None and seed != self._seed:
             self._seed = _count("seed", seed, 0)
             self._learnt.clear()
-        with single_threaded():
+        with computing():
             self._posterior = self.condition(inputs, outputs, np.random.default_rng(self._seed), noise=known)
         return self
 
@@ -257,7 +257,7 @@ class TreedGaussianProcess:
     def predict(self, X: ArrayLike, return_std: bool = False):
         """Return the mean (q,) at X (q, d), and the standard deviation (q,) of the latent function where asked for."""
         queries, _ = checked_data(X, None, self.posterior.regions.lower.shape[1])
-        with single_threaded():
+        with computing():
             mean, variance = mixture(self.posterior.moments(queries))
         return (mean, np.sqrt(variance)) if return_std else mean
 
