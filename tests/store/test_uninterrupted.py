@@ -33,6 +33,7 @@ def test_the_second_ctrl_c_does_not_wait():
     done = []
 
     @uninterrupted()
+    @uninterrupted()
     def impatient():
         ctrl_c()
         done.append("first")

@@ -22,6 +22,7 @@ from surehold.campaigns.problem_setup import build_problem, noise_of, observer, 
 from surehold.optimization.numerics.threads import single_threaded
 from surehold.optimization.strategy.initial_design import design
 from surehold.problems.perturbation import robust_score
+from surehold.store.uninterrupted import raise_interruption
 
 __all__ = ["TIMES", "changes", "expanded", "run_once", "versions"]
 
@@ -45,8 +46,7 @@ def run_once(cell: Cell, seed: int) -> dict[str, Any]:
         with single_threaded():
             row |= {"status": "done", **_Run(cell, seed).finish()}
     except Exception as error:
-        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C in compiled code, as a SystemError
-            raise KeyboardInterrupt from None
+        raise_interruption(error)
         row |= {"status": "failed", "error": f"{type(error).__name__}: {error}"}
     row |= {"cpu_seconds": round(process_time() - cpu, 3), "seconds": round(perf_counter() - started, 3)}
     return row | {"settings": cell.as_data(), "versions": versions()}

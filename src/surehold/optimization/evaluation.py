@@ -13,6 +13,7 @@ from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.points import numbers_of
 from surehold.optimization.trials import AskedTrial
 from surehold.optimization.values import LARGEST
+from surehold.store.uninterrupted import raise_interruption
 
 __all__ = ["Evaluation", "evaluate", "in_processes", "one_by_one"]
 
@@ -47,8 +48,7 @@ def evaluate(f: Callable[[Any], Any], x: NDArray[np.float64] | dict[str, Any]) -
     try:
         value = f(x.copy())
     except Exception as error:  # whatever a user's function raises is the trial's outcome, not the run's end
-        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C in compiled code, as a SystemError
-            raise KeyboardInterrupt from None
+        raise_interruption(error)
         if isinstance(error, TypeError) and _in_the_call(error.__traceback__):
             what = f"dictionary of {', '.join(x)}" if isinstance(x, dict) else f"array x of shape {x.shape}"
             raise InputError(f"the function cannot be called with one {what}: {error}.") from None

@@ -22,7 +22,7 @@ from surehold.optimization.lattice import Lattice
 
 __all__ = ["Region", "checked_rules", "region_of"]
 
-_ROUNDING: Final = 1e-9  # of a linear constraint's largest possible value: an input on its border is allowed
+_ROUNDING: Final = 1e-10  # of a linear constraint's largest possible value: an input on its border is allowed
 _SHRINKS: Final = 40  # halvings, on average, of a chord before a step is given up
 
 
