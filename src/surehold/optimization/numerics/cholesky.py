@@ -6,26 +6,22 @@ For n up to a few hundred, calls of LAPACK from compiled code cost more than the
 
 from math import sqrt
 
+from surehold.optimization.numerics.products import eight_products, product, two_products
 from surehold.store.kernels import njit
 
 __all__ = ["cholesky"]
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"})
+@njit(cache=True, fastmath={"contract"})
 def cholesky(A):
     """Overwrite the lower triangle of A (n, n) with its Cholesky factor; False if A is not positive definite.
 
-    Two columns at a time and four rows below them together: six loads from memory serve eight sums, where entry by
-    entry every sum would read both of its rows anew.
+    Two columns at a time, and four rows below them together.
     """
     n = A.shape[0]
     for j in range(0, n - 1, 2):
         u, v = A[j], A[j + 1]
-        uu = uv = vv = 0.0
-        for k in range(j):
-            uu += u[k] * u[k]
-            uv += u[k] * v[k]
-            vv += v[k] * v[k]
+        uu, uv = two_products(u, u, v, j)
         pivot = u[j] - uu
         if not pivot > 0.0:
             return False
@@ -33,7 +29,7 @@ def cholesky(A):
         first = 1.0 / u[j]
         v[j] = (v[j] - uv) * first
         between = v[j]
-        pivot = v[j + 1] - vv - between * between
+        pivot = v[j + 1] - product(v, v, j) - between * between
         if not pivot > 0.0:
             return False
         v[j + 1] = sqrt(pivot)
@@ -41,16 +37,7 @@ def cholesky(A):
         i = j + 2
         while i + 4 <= n:
             a, b, c, d = A[i], A[i + 1], A[i + 2], A[i + 3]
-            au = bu = cu = du = av = bv = cv = dv = 0.0
-            for k in range(j):
-                au += a[k] * u[k]
-                bu += b[k] * u[k]
-                cu += c[k] * u[k]
-                du += d[k] * u[k]
-                av += a[k] * v[k]
-                bv += b[k] * v[k]
-                cv += c[k] * v[k]
-                dv += d[k] * v[k]
+            au, bu, cu, du, av, bv, cv, dv = eight_products(a, b, c, d, u, v, j)
             a[j], b[j], c[j], d[j] = (a[j] - au) * first, (b[j] - bu) * first, (c[j] - cu) * first, (d[j] - du) * first
             a[j + 1] = (a[j + 1] - av - a[j] * between) * second
             b[j + 1] = (b[j + 1] - bv - b[j] * between) * second
@@ -59,18 +46,12 @@ def cholesky(A):
             i += 4
         for row in range(i, n):
             a = A[row]
-            au = av = 0.0
-            for k in range(j):
-                au += a[k] * u[k]
-                av += a[k] * v[k]
+            au, av = two_products(a, u, v, j)
             a[j] = (a[j] - au) * first
             a[j + 1] = (a[j + 1] - av - a[j] * between) * second
     if n % 2 == 1:
         last = A[n - 1]
-        total = 0.0
-        for k in range(n - 1):
-            total += last[k] * last[k]
-        pivot = last[n - 1] - total
+        pivot = last[n - 1] - product(last, last, n - 1)
         if not pivot > 0.0:
             return False
         last[n - 1] = sqrt(pivot)

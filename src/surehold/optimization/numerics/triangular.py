@@ -1,11 +1,11 @@
 """Products, inverses and solutions with small lower triangular matrices (compiled).
 
 Legend: L, T (n, n) lower triangular; of L the lower triangle alone is read, T holds zeros above its diagonal. Vectors
-stand in rows, so that every inner loop runs along memory. Blocks of rows are taken together, since a number that is
-loaded once then serves several sums. For n up to a few hundred, calls of BLAS from compiled code cost more, and they
-multiply the zeros as well: `benchmarks.factorization`.
+stand in rows, so that every inner loop runs along memory; blocks of rows are taken together (see `products`). Beside
+BLAS and LAPACK: `benchmarks.factorization`.
 """
 
+from surehold.optimization.numerics.products import eight_products, product, two_products
 from surehold.store.kernels import njit
 
 __all__ = [
@@ -22,10 +22,7 @@ __all__ = [
 def solve_lower(L, b):
     """Overwrite b (n,) with L^-1 b."""
     for i in range(b.size):
-        t = 0.0
-        for k in range(i):
-            t += L[i, k] * b[k]
-        b[i] = (b[i] - t) / L[i, i]
+        b[i] = (b[i] - product(L[i], b, i)) / L[i, i]
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
@@ -60,53 +57,21 @@ def invert_lower(L, inverse):
         row[i] = diagonal
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"})
+@njit(cache=True)
 def times_lower(T, K, out):
     """Fill row i of `out` (q, n) with T times row i of K (q, n)."""
     q, n = K.shape
-    even = n - n % 2
-    i = 0
-    while i + 4 <= q:
-        a, b, c, d = K[i], K[i + 1], K[i + 2], K[i + 3]
-        for r in range(0, even, 2):
-            u, v = T[r], T[r + 1]
-            au = bu = cu = du = av = bv = cv = dv = 0.0
-            for k in range(r + 2):
-                au += a[k] * u[k]
-                bu += b[k] * u[k]
-                cu += c[k] * u[k]
-                du += d[k] * u[k]
-                av += a[k] * v[k]
-                bv += b[k] * v[k]
-                cv += c[k] * v[k]
-                dv += d[k] * v[k]
-            out[i, r], out[i + 1, r], out[i + 2, r], out[i + 3, r] = au, bu, cu, du
-            out[i, r + 1], out[i + 1, r + 1], out[i + 2, r + 1], out[i + 3, r + 1] = av, bv, cv, dv
-        for r in range(even, n):
-            u = T[r]
-            au = bu = cu = du = 0.0
-            for k in range(n):
-                au += a[k] * u[k]
-                bu += b[k] * u[k]
-                cu += c[k] * u[k]
-                du += d[k] * u[k]
-            out[i, r], out[i + 1, r], out[i + 2, r], out[i + 3, r] = au, bu, cu, du
-        i += 4
-    for rest in range(i, q):
-        a = K[rest]
-        for r in range(0, even, 2):
-            u, v = T[r], T[r + 1]
-            au = av = 0.0
-            for k in range(r + 2):
-                au += a[k] * u[k]
-                av += a[k] * v[k]
-            out[rest, r], out[rest, r + 1] = au, av
-        for r in range(even, n):
-            u = T[r]
-            au = 0.0
-            for k in range(n):
-                au += a[k] * u[k]
-            out[rest, r] = au
+    even, whole = n - n % 2, q - q % 4
+    for r in range(0, even, 2):
+        for i in range(0, whole, 4):
+            found = eight_products(K[i], K[i + 1], K[i + 2], K[i + 3], T[r], T[r + 1], r + 2)
+            out[i, r], out[i + 1, r], out[i + 2, r], out[i + 3, r] = found[:4]
+            out[i, r + 1], out[i + 1, r + 1], out[i + 2, r + 1], out[i + 3, r + 1] = found[4:]
+        for i in range(whole, q):
+            out[i, r], out[i, r + 1] = two_products(K[i], T[r], T[r + 1], r + 2)
+    for r in range(even, n):
+        for i in range(q):
+            out[i, r] = product(K[i], T[r], n)
 
 
 @njit(cache=True, fastmath={"contract"})

@@ -16,6 +16,7 @@ is f(x) itself, so one compiled function serves both.
 import numpy as np
 
 from surehold.optimization.numerics.cholesky import cholesky
+from surehold.optimization.numerics.products import product
 from surehold.optimization.numerics.triangular import (
     invert_lower,
     solve_lower,
@@ -70,15 +71,6 @@ def _add(row, factor, sums):
     """Add factor times row (n,) to sums (n,)."""
     for a in range(row.size):
         sums[a] += factor * row[a]
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def _product(a, b):
-    """Return a'b of two vectors (n,); numpy.dot costs more for so few numbers."""
-    t = 0.0
-    for i in range(a.size):
-        t += a[i] * b[i]
-    return t
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
@@ -153,8 +145,8 @@ def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel
                 _add(C, s2[j] * weights[w], K[i])
         times_lower(inverse_L[j], K, V)
         for i in range(q):
-            mean[j, i] = _product(alpha[j], K[i])
-            variance[j, i] -= _product(V[i], V[i])
+            mean[j, i] = product(alpha[j], K[i], n)
+            variance[j, i] -= product(V[i], V[i], n)
         if gradient:
             times_lower_transposed(inverse_L[j], V, W)
             for i in range(q):
