@@ -128,3 +128,16 @@ def test_a_kernel_is_compiled_anew_where_one_that_it_calls_has_changed(tmp_path)
         )
         found.append(int(done.stdout))
     assert found == [20, 20, 30]
+
+
+def test_a_kernel_is_compiled_once_whether_or_not_an_argument_is_a_constant():
+    @kernels.njit(cache=False)
+    def times(x, n):
+        return x * n
+
+    @kernels.njit(cache=False)
+    def five_times(x, n):
+        return times(x, 2) + times(n=n, x=x)
+
+    assert five_times(7.0, 3) == 35.0
+    assert len(times.signatures) == 1

@@ -28,7 +28,7 @@ def announced(console: Console) -> Iterator[None]:
             if self.started is None:
                 self.started = time.perf_counter()
                 if not _said:
-                    console.print("Compiling numerical kernels, once for this installation (a minute or two) ...")
+                    console.print("Compiling numerical kernels, once for this installation (about a minute) ...")
                     _said.append(True)
 
         def on_end(self, event: Any) -> None: ...
@@ -48,7 +48,7 @@ def warm_up(problem: Any, settings: dict[str, Any], console: Console) -> None:
 
     Optimizer(problem.box, **settings)  # which begins the compilation
     if compiling() and not _said:
-        console.print("Compiling numerical kernels meanwhile, once for this installation (a minute or two) ...")
+        console.print("Compiling numerical kernels meanwhile, once for this installation (about a minute) ...")
         _said.append(True)
     own: Callable[[], Any] | None = getattr(problem, "warm_up", None)
     if own is not None:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numba
 from numba.core import config
+from numba.core.types.misc import unliteral
 
 __all__ = ["njit", "say_once"]
 
@@ -28,10 +29,10 @@ def njit(*signatures: Any, cache: bool = True, **options: Any) -> Any:
     """Return the decorator `numba.njit` of the same arguments, which outlives a cache that cannot be written."""
 
     def compiled(function: Callable[..., Any]) -> Any:
-        plain = numba.njit(*signatures, **options)
+        plain = _one_for_constants(numba.njit(*signatures, **options))
         if not cache:
             return plain(function)
-        kept = numba.njit(*signatures, cache=True, **options)
+        kept = _one_for_constants(numba.njit(*signatures, cache=True, **options))
         try:
             return _saving_where_possible(kept(function))
         except RuntimeError as error:  # numba found no folder
@@ -52,6 +53,24 @@ def njit(*signatures: Any, cache: bool = True, **options: Any) -> Any:
             settings.CACHE_DIR = before
 
     return compiled
+
+
+def _one_for_constants(decorator: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the decorator, of functions that other compiled ones call with a constant as with any other number.
+
+    numba compiles a function anew for each constant argument, with all that it calls.
+    """
+
+    def decorated(function: Callable[..., Any]) -> Any:
+        dispatcher = decorator(function)
+        typed = getattr(dispatcher, "get_call_template", None)
+        if typed is not None:  # NUMBA_DISABLE_JIT gives the function back
+            dispatcher.get_call_template = lambda args, kws: typed(
+                [unliteral(arg) for arg in args], {name: unliteral(arg) for name, arg in kws.items()}
+            )
+        return dispatcher
+
+    return decorated
 
 
 def _saving_where_possible(dispatcher: Any) -> Any:

@@ -83,10 +83,7 @@ def hand_arrays(hand: Hand, rates: NDArray[np.float64]) -> HandArrays:
 def times(outer, inner):
     """Return the pose (3, 4) that first applies `inner`, then `outer`."""
     out = np.empty((3, 4))
-    for i in range(3):
-        for n in range(4):
-            out[i, n] = outer[i, 0] * inner[0, n] + outer[i, 1] * inner[1, n] + outer[i, 2] * inner[2, n]
-        out[i, 3] += outer[i, 3]
+    _write_product(outer, inner, out)
     return out
 
 
@@ -95,8 +92,17 @@ def placed(pose, frames):
     """Return frames (k, 3, 4) moved by a pose (3, 4)."""
     out = np.empty(frames.shape)
     for k in range(len(frames)):
-        out[k] = times(pose, frames[k])
+        _write_product(pose, frames[k], out[k])
     return out
+
+
+@njit(cache=True)
+def _write_product(outer, inner, out):
+    """Write the pose (3, 4) that first applies `inner`, then `outer`."""
+    for i in range(3):
+        for n in range(4):
+            out[i, n] = outer[i, 0] * inner[0, n] + outer[i, 1] * inner[1, n] + outer[i, 2] * inner[2, n]
+        out[i, 3] += outer[i, 3]
 
 
 @njit(cache=True)
@@ -121,7 +127,10 @@ def attempt(nodes, frame, hand, pose, start, model, adaptive, depth):
     `model` is one of the contact models of contacts.py; `adaptive` as of `close_hand`; depth of the soft touch [m].
     """
     motion = np.empty((4, *start.shape))
-    motion[0], motion[1], motion[2], motion[3] = start, hand.rates, hand.lower, hand.upper
+    for f in range(start.shape[0]):
+        for j in range(start.shape[1]):
+            motion[0, f, j], motion[1, f, j] = start[f, j], hand.rates[f, j]
+            motion[2, f, j], motion[3, f, j] = hand.lower[f, j], hand.upper[f, j]
     opened = np.minimum(np.maximum(start, hand.lower), hand.upper)
     gaps = open_gaps(nodes, frame, hand, pose, opened)
     deepest, deep = 0.0, 0.0
@@ -146,8 +155,8 @@ def attempt(nodes, frame, hand, pose, start, model, adaptive, depth):
 
 @njit(cache=True)
 def _closed(nodes, frame, hand, bases, palms, motion, adaptive, brush, stop):
-    """Close the hand; return joints, which links touched, passes (f j, 3) of time, gap and leave, and looks."""
-    joints, touched, when, gap, leave, looks = close_hand(
+    """Close the hand; return the fields of `Closed`."""
+    return close_hand(
         nodes,
         frame,
         bases,
@@ -164,9 +173,6 @@ def _closed(nodes, frame, hand, bases, palms, motion, adaptive, brush, stop):
         brush,
         stop,
     )
-    passes = np.empty((len(when), 3))
-    passes[:, 0], passes[:, 1], passes[:, 2] = when, gap, leave
-    return joints, touched, passes, looks
 
 
 @njit(cache=True)
@@ -186,7 +192,8 @@ def _mix_finger(finger, nodes, frame, hand, pose, bases, palms, motion, adaptive
         hold, since, share = held.pop(), after.pop(), shares.pop()
         if outcomes > 0:
             stop = np.full(hand.radii.shape, np.inf)
-            stop[finger] = hold
+            for j in range(per_finger):
+                stop[finger, j] = hold[j]
             joints, _, passes, _ = _closed(nodes, frame, hand, bases, palms, motion, adaptive, depth, stop)
         left, time, link = 1.0, since, -1
         while True:  # passes in the order of their times, of equal ones by link

@@ -49,9 +49,9 @@ class Closed(NamedTuple):
 
     joints: NDArray[np.float64]  #: (f, j) rad or m
     touched: NDArray[np.bool_]  #: (f j,) which links were stopped by the object
-    pass_time: NDArray[np.float64]  #: (f j,) closing parameter of a link's closest approach in passing, or infinity
-    pass_gap: NDArray[np.float64]  #: (f j,) gap there, below `brush` [m]
-    pass_leave: NDArray[np.float64]  #: (f j,) largest gap found afterwards [m]
+    passes: NDArray[np.float64]
+    """(f j, 3) of each link: closing parameter of its closest approach in passing, or infinity; gap there, below
+    `brush` [m]; largest gap found afterwards [m]."""
     looks: int  #: number of gaps computed
 
 
@@ -204,9 +204,8 @@ def close_hand(
             until = min(until, begins(second[i] // per_finger, second[i] % per_finger, motion, stop))
         resting[i] = second[i] != -1
         open_until[i] = until
-    pass_time = np.full(links, np.inf)
-    pass_gap = np.full(links, np.inf)
-    pass_leave = np.zeros(links)
+    passes = np.empty((links, 3))
+    passes[:, :2], passes[:, 2] = np.inf, 0.0
     looked = np.full((links, 2), np.inf)  # gap at the last look and at the one before
     times = np.zeros((links, 2))
     looks = 0
@@ -243,13 +242,13 @@ def close_hand(
             _link_at(fb, kb, t, bases, chains, motion, stop, other, turns_b)
             gap = capsule_pair_gap(mine[0], mine[1], other[0], other[1], radius + radii[fb, kb], across)
         if b == -1 and brush > 0.0:
-            pass_leave[a] = max(pass_leave[a], gap)
+            passes[a, 2] = max(passes[a, 2], gap)
             if looked[a, 0] < 1.5 * brush and looked[a, 0] <= looked[a, 1] and looked[a, 0] < gap:
                 when, near = _closest(
                     fa, ka, times[a, 1], t, nodes, frame, bases, chains, motion, stop, radius, other, turns, pieces
                 )
-                if near < min(brush, pass_gap[a]):
-                    pass_time[a], pass_gap[a], pass_leave[a] = when, near, gap
+                if near < min(brush, passes[a, 1]):
+                    passes[a, 0], passes[a, 1], passes[a, 2] = when, near, gap
             looked[a, 1], times[a, 1] = looked[a, 0], times[a, 0]
             looked[a, 0], times[a, 0] = gap, t
         if gap > TOUCH:
@@ -290,4 +289,4 @@ def close_hand(
         for j in range(per_finger):
             angle = motion[0, f, j] + motion[1, f, j] * min(closed, stop[f, j])
             joints[f, j] = min(max(angle, motion[2, f, j]), motion[3, f, j])
-    return joints, touched, pass_time, pass_gap, pass_leave, looks
+    return joints, touched, passes, looks
