@@ -1,6 +1,7 @@
 """Where the next trial is made: of the initial design, then by the strategy, and where neither has a place left."""
 
 from collections.abc import Callable
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -43,13 +44,14 @@ class Asking:
     ) -> NDArray[np.float64]:
         """Return the place (d,) in the cube of the trial at this position in the design and the random sequence.
 
-        Unless it is `numbered`, places of the design that have been used are left out. `posterior` is called where it
-        is needed.
+        Places of the design at which trials were told are left out. A `numbered` position also leaves one to each
+        trial of a lower number that was not told: others may have asked for it. `posterior` is called where it is
+        needed.
         """
         parts = self._parts
         rng = np.random.default_rng([parts.seed, 2, position])
         if position < parts.n_initial:
-            u = parts.design[position if numbered else self._unused(trials, position)]
+            u = parts.design[self._place_in_design(trials, position, numbered)]
         elif not trials.successful.any():
             u = self._anywhere(trials, rng)  # every trial failed or is pending: keep covering
         else:
@@ -58,15 +60,19 @@ class Asking:
         u = self._snapped(u)
         return self._box.uncontrolled.at_mean(u) if self._measured and self._box.uncontrolled is not None else u
 
-    def _unused(self, trials: Trials, position: int) -> int:
-        """Return the place in the design to ask for next: the position, or the first unused one after a `forget`."""
-        design = self._snapped(self._parts.design)
-        made = np.concatenate([trials.commanded, trials.pending])
+    def _place_in_design(self, trials: Trials, position: int, numbered: bool) -> int:
+        made = trials.commanded if numbered else np.concatenate([trials.commanded, trials.pending])
+        design, made = self._controlled(self._snapped(self._parts.design)), self._controlled(made)
 
         def unused(place: int) -> bool:  # on a lattice several places may be one point
             return int(same(design[place], made).sum()) <= int(same(design[place], design[:place]).sum())
 
-        return position if unused(position) else next(filter(unused, range(self._parts.n_initial)), position)
+        elsewhere = position - int(np.sum(trials.numbers < position)) if numbered else 0
+        return next(islice(filter(unused, range(self._parts.n_initial)), elsewhere, None), position)
+
+    def _controlled(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return points (k, d) of the cube that differ in what is commanded alone."""
+        return U if self._box.uncontrolled is None else self._box.uncontrolled.at_mean(U)
 
     def _proposed(
         self, trials: Trials, posterior: Callable[[], Posterior], rng: np.random.Generator

@@ -122,6 +122,9 @@ class StudySettings:
                     ours, asked = ({k: side.get(k) for k in differing} for side in (ours, asked))
                 if ours != asked:
                     found.append(f"{name} {key}: {_short(ours)} in the study, {_short(asked)} now".strip())
+        names, asked = (list(side["parameters"]) for side in (mine, theirs))
+        if names != asked and set(names) == set(asked):  # a function that takes an array tells them by their places
+            found.append(f"order of the parameters: {', '.join(names)} in the study, {', '.join(asked)} now")
         if self.direction != other.direction:
             found.append(f"direction: {self.direction} in the study, {other.direction} now")
         if mine["input_noise"] != theirs["input_noise"]:

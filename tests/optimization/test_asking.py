@@ -1,0 +1,48 @@
+"""Which place of the initial design is asked for next, beside trials that were told from elsewhere."""
+
+import numpy as np
+import pytest
+
+import surehold as sh
+
+FIRST = [[0.2], [0.8]]
+
+
+def optimizer(**settings):
+    return sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), initial_points=FIRST, n_initial=4, seed=0, **settings)
+
+
+def test_a_trial_told_before_the_first_ask_takes_no_initial_point_away():
+    warm = optimizer()
+    warm.tell([0.5], 0.7)
+    assert [warm.ask()[0] for _ in range(2)] == [0.2, 0.8]
+
+
+def test_nor_do_restored_ones_and_those_told_between():
+    warm = optimizer()
+    warm.restore([[0.5]], [0.7])
+    warm.tell(warm.ask(), 0.1)
+    warm.tell([0.6], 0.8)
+    assert warm.ask() == pytest.approx([0.8])
+
+
+def test_numbered_trials_go_on_with_the_design_after_told_ones_however_many_are_under_way():
+    plain = [optimizer().ask(number=number)[0] for number in range(4)]
+    warm = optimizer()
+    warm.restore([[0.5], [0.6]], [0.7, 0.8], numbers=[0, 3])
+    asked = [warm.ask(number=number)[0] for number in (1, 2)]
+    assert asked == plain[:2] == [0.2, 0.8]
+    later = optimizer()  # another worker, that sees neither of the two
+    later.restore([[0.5], [0.6]], [0.7, 0.8], numbers=[0, 3])
+    assert later.ask(number=2)[0] == 0.8
+
+
+def test_a_place_of_the_design_is_the_same_whatever_the_uncontrolled_conditions_were():
+    box = sh.Box({"x": (0.0, 1.0)}, uncontrolled={"t": np.linspace(0.0, 1.0, 11)})
+    free = sh.Optimizer(box, n_initial=4, seed=0)
+    asked = []
+    for k in range(4):
+        trial = free.ask_trial()
+        asked.append(trial.parameters["x"])
+        free.tell(trial, float(k), reached={**trial.parameters, "t": 0.1 * k})
+    assert len(set(asked)) == 4
