@@ -46,3 +46,24 @@ def test_a_place_of_the_design_is_the_same_whatever_the_uncontrolled_conditions_
         asked.append(trial.parameters["x"])
         free.tell(trial, float(k), reached={**trial.parameters, "t": 0.1 * k})
     assert len(set(asked)) == 4
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{}, {"input_noise": sh.InputNoise.unit(0.03), "risk": "worst"}, {"preset": "thesis"}],
+    ids=["exact", "worst", "thesis"],
+)
+def test_trials_under_way_at_the_same_time_are_at_different_places(settings):
+    told = sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), seed=0, **settings)
+    for _ in range(14):
+        x = told.ask()
+        told.tell(x, -((x[0] - 0.3) ** 2))
+    assert np.diff(np.sort(told.ask(6).ravel())).min() >= 1e-3
+
+
+def test_where_every_place_is_under_way_noisy_ones_are_asked_for_again():
+    few = sh.Optimizer(sh.Box({"grip": ["pinch", "power"]}), noise=0.1, n_initial=2, seed=0)
+    for _ in range(4):
+        trial = few.ask_trial()
+        few.tell(trial, float(trial.parameters["grip"] == "pinch"))
+    assert {trial.parameters["grip"] for trial in few.ask_trial(4)} <= {"pinch", "power"}

@@ -1,5 +1,7 @@
 """What is stated of the answer: of one execution, and of the mean of many."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -85,3 +87,33 @@ def test_the_best_value_told_from_outside_of_the_box_is_named_and_refused(direct
 )
 def test_a_value_is_said_to_a_tenth_of_its_deviation(value, deviation, text):
     assert in_digits(value, deviation) == text
+
+
+def test_why_the_highest_is_refused_is_said_by_the_measure_that_decided():
+    def spike(x):
+        return 1.5 * np.exp(-0.5 * ((x[0] - 0.2) / 0.01) ** 2) + np.exp(-0.5 * ((x[0] - 0.7) / 0.1) ** 2)
+
+    noise = sh.InputNoise.unit(0.03)
+    box = sh.Box({"x": (0.0, 1.0)})
+    refused = sh.maximize(spike, box, n_trials=25, input_noise=noise, risk="var", seed=1).recommendation.refused
+    assert "its 'var' is" in refused
+    of_highest, of_recommended = (float(number) for number in re.findall(r"(?:is|one) (-?[\d.]*\d)", refused)[-2:])
+    assert of_highest < of_recommended
+
+
+def test_a_place_that_is_worth_as_much_is_no_worse():
+    found = sh.maximize(
+        lambda x: x[0] + x[1],
+        sh.Box.unit(2),
+        n_trials=20,
+        allowed=["x1+x2<=1", "x1<=0.2"],
+        input_noise=sh.InputNoise.unit(0.03),
+        seed=0,
+    ).recommendation
+    assert not found.refused or "worth no more" in found.refused
+
+
+def test_a_box_that_is_not_plain_is_shown_by_its_parameters():
+    box = sh.Box({"f": (1e-4, 1.0, "log"), "g": ["a", "b"]})
+    found = sh.minimize(lambda p: (np.log(p["f"]) + 2.0) ** 2, box, n_trials=12, seed=0).recommendation
+    assert repr(found).startswith("Recommendation(parameters={'f': 0.1")

@@ -534,6 +534,11 @@ def test_a_study_that_minimizes_asks_what_its_mirror_image_asks(tmp_path):
     assert best_down.quantile == pytest.approx(-best_up.quantile, abs=1e-9)
 
 
+def test_parameters_in_another_order_are_another_study():
+    here, there = (StudySettings(SearchSpace(sh.Box(dict.fromkeys(names, (0.0, 1.0))))) for names in ("xy", "yx"))
+    assert here.differences(there) == ["order of the parameters: x, y in the study, y, x now"]
+
+
 def test_a_direction_that_does_not_exist_and_one_that_differs(tmp_path):
     with pytest.raises(InputError, match="direction"):
         StudySettings(SearchSpace(BOX), direction="down")

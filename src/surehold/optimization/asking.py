@@ -17,6 +17,8 @@ from surehold.optimization.trials import Trials, same
 
 __all__ = ["Asking", "history_of"]
 
+_APART: Final = 1e-3  # box widths between trials under way: robots at one place at one time learn one thing
+
 
 def history_of(trials: Trials, requirements: Requirements | None, values: NDArray[np.float64]) -> History:
     """Return what a strategy knows of the trials, whose values (t,) count as given."""
@@ -88,13 +90,16 @@ class Asking:
         candidates = self._snapped(candidates)
         if history.admission is not None:
             candidates = candidates[history.admission.possible(candidates)]
+        apart = [candidate for candidate in candidates if not self._beside_pending(candidate, trials)]
         if strategy.ranking.noisy and len(candidates):
-            return candidates[0]
-        tried = np.concatenate([trials.commanded, trials.pending])
-        for candidate in candidates:
-            if np.count_nonzero(same(candidate, tried)) <= strategy.repeats:
+            return (apart or candidates)[0]
+        for candidate in apart:
+            if np.count_nonzero(same(candidate, trials.commanded)) <= strategy.repeats:
                 return candidate
         return self._anywhere(trials, rng)  # every candidate has been tried already
+
+    def _beside_pending(self, u: NDArray[np.float64], trials: Trials) -> bool:
+        return bool(len(trials.pending) and np.abs(trials.pending - u).max(axis=1).min() < _APART)
 
     def _anywhere(self, trials: Trials, rng: np.random.Generator) -> NDArray[np.float64]:
         if self._parts.requirements is not None:

@@ -344,6 +344,7 @@ class Optimizer(Record):
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
                 self._model.execution_noise(self._trials),
                 "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
+                ranking.judged(posterior, highest[0], u),
             )
             if self._requirements is not None:
                 answer = self._requirements.described(answer, self._trials, u, reached, self._sign)

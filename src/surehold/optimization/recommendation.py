@@ -89,7 +89,8 @@ class Recommendation:
     Attributes
     ----------
     x : (d,)
-        In the box's units.
+        In the box's units, those of `Box.from_unit`: of a logarithmic variable the logarithm, of a choice a number for
+        each of its values.
     mean
         Expected outcome under the input noise.
     std
@@ -142,9 +143,11 @@ class Recommendation:
     outputs: Mapping[str, Outcome] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        x = np.array2string(self.x, precision=6, separator=", ")
         mean, quantile = (in_digits(value, self.std, 6) for value in (self.mean, self.quantile))
-        return f"Recommendation(x={x}, mean={mean}, std={self.std:.3g}, quantile={quantile})"
+        plain = list(self.parameters.values()) == self.x.tolist()
+        named = {k: float(f"{v:.6g}") if isinstance(v, float) else v for k, v in self.parameters.items()}
+        where = f"x={np.array2string(self.x, precision=6, separator=', ')}" if plain else f"parameters={named}"
+        return f"Recommendation({where}, mean={mean}, std={self.std:.3g}, quantile={quantile})"
 
     def probability_below(self, value: float) -> float:
         """Return the probability that the next execution gives less than `value`."""
@@ -216,10 +219,12 @@ def recommendation(
     outliers: tuple[int, ...] = (),
     noise_variance: float | None = None,
     warning: str = "",
+    by_risk: tuple[str, float, float] | None = None,
 ) -> Recommendation:
     """Describe u (d,) of the unit cube; `highest` is where the best observed trial was, and its value.
 
-    `sign` is that of the values in which the answer is given: -1 where what was told has been turned over.
+    `sign` is that of the values in which the answer is given: -1 where what was told has been turned over. `by_risk` is
+    the risk measure by which u was chosen, if it is not the mean, and what `highest` and u are worth by it.
     """
     outcome = execution_at(posterior, reached, u, noise_variance)
     expectation = expectation_at(posterior, reached, u)
@@ -238,12 +243,17 @@ def recommendation(
         refused = f"The {best} observed trial gave {said(highest[1])}, but {OUTSIDE}"
     elif np.any(np.abs(highest[0] - u) > 1e-6):
         other = execution_at(posterior, reached, highest[0], noise_variance)
-        refused = (
-            f"The {best} observed trial gave {said(highest[1])}, but under the noise {said(other.mean)} is "
-            f"expected, and {worse} than {said(other.quantile(_LEVEL))} once in twenty executions; of the "
-            f"recommended one {said(outcome.mean)} is expected, and {worse} than "
-            f"{said(outcome.quantile(_LEVEL))} once in twenty."
-        )
+        refused = f"The {best} observed trial gave {said(highest[1])}, but under the noise "
+        if by_risk is not None:
+            refused += f"its '{by_risk[0]}' is {said(by_risk[1])}, that of the recommended one {said(by_risk[2])}."
+        elif other.mean >= outcome.mean or said(other.mean) == said(outcome.mean):
+            refused += f"it is worth no more than the recommended one: {said(outcome.mean)} is expected."
+        else:
+            refused += (
+                f"{said(other.mean)} is expected, and {worse} than {said(other.quantile(_LEVEL))} once in twenty "
+                f"executions; of the recommended one {said(outcome.mean)} is expected, and {worse} than "
+                f"{said(outcome.quantile(_LEVEL))} once in twenty."
+            )
     x = box.from_unit(u)
     return Recommendation(
         x,

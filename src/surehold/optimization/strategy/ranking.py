@@ -146,6 +146,14 @@ class Ranking:
         """Return the expected risk measure (q,) at U (q, d)."""
         return self._measured(posterior).expectation(U)
 
+    def judged(
+        self, posterior: Posterior, one: NDArray[np.float64], other: NDArray[np.float64]
+    ) -> tuple[str, float, float] | None:
+        """Return the name of the risk measure and what it is at two points (d,); None where the mean decides."""
+        if self.risk.name == "mean" or self.exact_inputs:
+            return None
+        return self.risk.name, *self.risk_at(posterior, np.array([one, other])).tolist()
+
     @property
     def exact_inputs(self) -> bool:
         """Whether inputs are reached exactly."""
