@@ -165,3 +165,20 @@ def test_repeats_that_differ_say_nothing_where_the_first_at_every_place_gave_the
     optimizer = sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), seed=0)
     optimizer.restore([[0.5], [0.5], [0.6]], [2.0, 1.0, 2.0])
     assert optimizer.diagnosis() is None
+
+
+@pytest.mark.parametrize("noise", [None, "inferred", 0.05])
+def test_values_that_contradict_each_other_at_one_input_are_named_where_no_noise_explains_them(noise):
+    optimizer = sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), noise=noise, seed=0)
+    rng = np.random.default_rng(0)
+    for x in (0.1, 0.3, 0.5, 0.7, 0.9):
+        for _ in range(3):
+            optimizer.tell([x], 1.0 - (x - 0.5) ** 2 + 0.05 * rng.normal())
+    assert ("give noise='inferred'" in optimizer.recommend().warning) == (noise is None)
+
+
+def test_equal_values_at_one_input_are_no_contradiction():
+    optimizer = sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), seed=0)
+    for x in (0.1, 0.1, 0.3, 0.5, 0.7, 0.7, 0.9):
+        optimizer.tell([x], 1.0 - (x - 0.5) ** 2)
+    assert not optimizer.diagnosis().contradicted

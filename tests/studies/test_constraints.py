@@ -77,7 +77,7 @@ def test_the_first_answer_counts_for_outputs_too(study):
 
 
 def test_workers_store_outputs(study):
-    function = trial_function(lambda x: outcome({"a": x[0], "b": x[1], "n": x[2]}), SPACE)
+    function = trial_function(outcome, SPACE)  # which has a whole number and so is told names, as from maximize
     assert work(study, function, most=3) == 3
     stored = [trial.user_attrs["surehold:outputs"] for trial in study.trials()]
     assert [set(outputs) for outputs in stored] == [{"torque", "temperature"}] * 3

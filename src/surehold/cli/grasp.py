@@ -14,12 +14,14 @@ from surehold.cli.grasp_check import checked, checker_for
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.grasp_rate import Formats
 from surehold.cli.options import (
+    REQUERIES,
     Initial,
     Method,
     Noise,
     Open,
     Out,
     Preset,
+    Requeries,
     Seed,
     Study,
     StudyStorage,
@@ -105,6 +107,7 @@ def grasp(
         str, typer.Option(help="What a trial gives: quality, or held (success or failure, by physics).")
     ] = "quality",
     formats: Formats = "isaac",
+    requeries: Requeries = REQUERIES,
     open_report: Open = False,
     **options: Any,
 ) -> None:
@@ -180,6 +183,7 @@ def grasp(
         seed=seed,
         preset=preset,
         folder=folder,
+        requeries=requeries,
         open_report=open_report,
         settings={
             "object": problem.object.name,

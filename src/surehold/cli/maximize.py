@@ -5,6 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from surehold.cli.options import (
+    REQUERIES,
     Allowed,
     Constraint,
     Failures,
@@ -15,6 +16,7 @@ from surehold.cli.options import (
     Open,
     Out,
     Preset,
+    Requeries,
     Safety,
     Seed,
     Study,
@@ -88,6 +90,7 @@ def maximize(
     outcome: Annotated[
         str, typer.Option(help="What a trial gives: value, or success (your function returns True or False).")
     ] = "value",
+    requeries: Requeries = REQUERIES,
     open_report: Open = False,
 ) -> None:
     """Find a maximum that still holds when the input is off.
@@ -119,6 +122,7 @@ def maximize(
         seed=seed,
         preset=preset,
         folder=folder_for(chosen.name, method, seed, out, study),
+        requeries=requeries,
         open_report=open_report,
         settings={
             "problem": problem,

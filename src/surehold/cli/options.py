@@ -9,6 +9,7 @@ from surehold.optimization.noise.input_noise import InputNoise
 
 __all__ = [
     "METHODS",
+    "REQUERIES",
     "Allowed",
     "Constraint",
     "Failures",
@@ -19,6 +20,7 @@ __all__ = [
     "Open",
     "Out",
     "Preset",
+    "Requeries",
     "Safety",
     "Seed",
     "Study",
@@ -67,6 +69,10 @@ StudyStorage = Annotated[
 ]
 Trials = Annotated[int | None, typer.Option(help="Number of trials, the initial ones included.")]
 Initial = Annotated[int | None, typer.Option(help="Number of trials of the initial design.")]
+REQUERIES = 100  # perturbed re-queries of a point; they score and are no part of the budget
+Requeries = Annotated[
+    int, typer.Option(help="Executions with the noise of each point that is shown, after the trials; 0: none.")
+]
 Constraint = Annotated[
     list[str] | None,
     typer.Option(

@@ -17,12 +17,12 @@ from rich.table import Table
 from surehold.cli.compilation import announced, warm_up
 from surehold.cli.folders import folder_of
 from surehold.cli.interruption import terminable, undisturbed
-from surehold.cli.options import METHODS
+from surehold.cli.options import METHODS, REQUERIES
+from surehold.cli.requeries import requeried
 from surehold.cli.terminal import terminal
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.maximization import Result, Trial, maximize
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.problems.perturbation import RobustScore, robust_score
 from surehold.problems.problem import Problem
 from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
@@ -33,7 +33,6 @@ __all__ = ["NO_SUCCESS", "Kept", "folder_for", "run_session"]
 
 NO_SUCCESS = 3  # exit code of a run whose trials all gave a value, none of which is a success
 
-REQUERIES = 100  # perturbed re-queries of a candidate; they score and are no part of the budget
 _MOST_TRIALS = 100_000  # a model of more is out of reach
 
 
@@ -87,13 +86,15 @@ def run_session(
     advice: str = "",
     kept: Kept | None = None,
     required: Mapping[str, Any] | None = None,
+    requeries: int = REQUERIES,
     console: Console | None = None,
 ) -> RunReport:
     """Optimize, score, write and show; Ctrl-C and SIGTERM keep what was done.
 
     A run that is kept as a study is resumed where that exists.
 
-    `required` are further settings of an `Optimizer`: surrogate, and those of constraints and failures.
+    `required` are further settings of an `Optimizer`: surrogate, and those of constraints and failures. `requeries` are
+    those of each point that is shown, with the noise.
 
     `describe` adds to a candidate what the problem knows of it; `also_write` writes further files. Where no trial is
     worth more than `success_above`, the report says so first, with the counts of `outcomes` and `advice`; what the
@@ -111,9 +112,9 @@ def run_session(
     console = console or terminal()
     started = time.perf_counter()
     with terminable(), _new_folder_removed_on_error(folder):
-        for name, count in (("trials", trials), ("initial", initial)):
-            if count < 1:
-                raise InputError(f"--{name} is {count}; give 1 or more.")
+        for name, count, least in (("trials", trials, 1), ("initial", initial, 1), ("requeries", requeries, 0)):
+            if count < least:
+                raise InputError(f"--{name} is {count}; give {least} or more.")
             if count > _MOST_TRIALS:
                 raise InputError(f"--{name} is {count}; give {_MOST_TRIALS:,} at most.")
         if initial > trials:
@@ -150,14 +151,8 @@ def run_session(
         if result.interrupted:
             console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
         notes = _failures(result)
-        scores: dict[tuple[str, int], RobustScore | None] = {}
-        for label, index in gather.answers(result).items():
-            scores[label, index] = None
-            if noise is not None:
-                try:
-                    scores[label, index] = robust_score(problem, result.X[index], noise, n=REQUERIES, seed=seed)
-                except KeyboardInterrupt:
-                    notes = [*notes, f"The re-queries of the {label} point were interrupted and left out."]
+        scores, missing = requeried(problem, result, gather.answers(result), noise, requeries, seed, console)
+        notes = [*notes, *missing]
         with undisturbed(console):
             report = gather.report_of(
                 result,

@@ -23,6 +23,8 @@ from surehold.optimization.surrogates.protocol import LeavesOut, Posterior, mixt
 __all__ = ["Diagnosis", "diagnosis"]
 
 _WITHIN: Final = 1.959964  # standard deviations of a 95 % interval
+_APART: Final = 6.0  # standard deviations of the observation noise between two values at one input: noise explains less
+_ROUNDING: Final = 1e-6  # a difference below this share of the range of all values
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Diagnosis:
         trials. NaN of models without length-scales.
     n
         Number of trials.
+    contradicted
+        Whether trials at one input gave values that differ by more than the observation noise of the model explains.
     """
 
     error: float
@@ -53,6 +57,7 @@ class Diagnosis:
     disagreement: float
     resolution: float
     n: int
+    contradicted: bool = False
 
     @property
     def explains_nothing(self) -> bool:
@@ -62,6 +67,11 @@ class Diagnosis:
     @property
     def warning(self) -> str:
         """What is wrong with the model, in one or two sentences; empty where nothing is."""
+        if self.contradicted:
+            return (
+                "Trials at one input gave different values, and the model knows of no observation noise that explains "
+                "it: give noise='inferred', or its standard deviation."
+            )
         if self.explains_nothing:
             return (
                 f"The model explains less of the response than a constant would: of a trial that it has not seen it "
@@ -106,7 +116,19 @@ def diagnosis(posterior: Posterior, X: NDArray[np.float64], y: NDArray[np.float6
         disagreement=float(w @ (between / np.maximum(variance, np.finfo(np.float64).tiny))),
         resolution=float("nan") if scales is None else float(np.median(scales, axis=0).min() * n ** (1.0 / d)),
         n=n,
+        contradicted=_contradicted(posterior, X, y),
     )
+
+
+def _contradicted(posterior: Posterior, X: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
+    places, of = np.unique(X, axis=0, return_inverse=True)
+    if len(places) == len(X):
+        return False
+    highest, lowest = (np.full(len(places), bound) for bound in (-np.inf, np.inf))
+    np.maximum.at(highest, of.ravel(), y)
+    np.minimum.at(lowest, of.ravel(), y)
+    explained = _APART * np.sqrt(posterior.noise_variance(places).mean(axis=0))
+    return bool(np.any(highest - lowest > np.maximum(explained, _ROUNDING * np.ptp(y))))
 
 
 def shares(X: NDArray[np.float64]) -> NDArray[np.float64]:

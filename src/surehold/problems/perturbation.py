@@ -1,5 +1,6 @@
 """Score an input by what happens around it: re-query the problem where an imprecise execution would end up."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -82,9 +83,16 @@ def perturbed_points(
 
 
 def robust_score(
-    problem: Problem, x: ArrayLike, noise: InputNoise | None, n: int = 100, seed: int | np.random.Generator = 0
+    problem: Problem,
+    x: ArrayLike,
+    noise: InputNoise | None,
+    n: int = 100,
+    seed: int | np.random.Generator = 0,
+    told: Callable[[float], object] = lambda outcome: None,
 ) -> RobustScore:
     """Query `problem` at n perturbations of x (d,) and return mean, standard deviation and worst outcome.
+
+    `told` is called with each outcome, NaN where a re-query failed.
 
     A re-query that raises an exception or gives no finite number is counted in `n_failed` and left out. Inputs leave
     the box only if the problem says so (`problem.border == "extend"`), see `perturbed_points`.
@@ -96,7 +104,10 @@ def robust_score(
     """
     border = "extend" if getattr(problem, "border", "keep") == "extend" else "keep"
     points = perturbed_points(x, problem.box, noise, n, seed, border)
-    outcomes = np.array([_outcome(problem, point) for point in points])
+    outcomes = np.empty(len(points))
+    for i, point in enumerate(points):
+        outcomes[i] = _outcome(problem, point)
+        told(outcomes[i])
     values = outcomes[np.isfinite(outcomes)]
     n_failed = int(outcomes.size - values.size)
     if values.size == 0:

@@ -27,14 +27,14 @@ class Outcome(NamedTuple):
 def trial_function(f: Callable[[Any], Any], space: SearchSpace) -> Callable[[Mapping[str, Any]], Outcome]:
     """Return what makes one trial from its parameters; it never raises.
 
-    f takes the numbers x (d,) in the order of the parameters; where a parameter is a choice among names, it takes the
-    parameters {name: value} instead.
+    f takes the numbers x (d,) in the order of the parameters; where a parameter is logarithmic, a whole number, in
+    steps or a choice, it takes the parameters {name: value} instead, as from `surehold.maximize`.
     """
-    choices = any(isinstance(v, str) or v is None for v in _examples(space))
+    named = space.box is None or not space.box.plain
 
     def attempt(parameters: Mapping[str, Any]) -> Outcome:
         try:
-            if choices:
+            if named:
                 return Outcome(*evaluate(lambda _: f(dict(parameters)), np.empty(0)))
             return Outcome(*evaluate(f, np.array([parameters[n] for n in space.distributions], dtype=np.float64)))
         except InputError as error:  # cannot be called at all
@@ -71,8 +71,3 @@ def problem_of(settings: StudySettings, function: str = "") -> Callable[[Any], A
         "the study says nothing about what its trials are; a robot makes them (surehold study ask, tell), or give "
         "--function package.module:function."
     )
-
-
-def _examples(space: SearchSpace) -> list[Any]:
-    """Return some value of every choice among names."""
-    return [choice for d in space.distributions.values() for choice in getattr(d, "choices", ())]
