@@ -225,7 +225,11 @@ def advice_for(problem: Any) -> str:
 
     faults = hand_faults(problem.simulator.hand, problem.simulator.preshape)
     seen = f"The hand looks wrong: {' '.join(faults)} See it with surehold hand show. " if faults else ""
-    return f"{seen}Try another --facet, more --variables (dz, rx, ry, rz or s1), another --preshape, or more --trials."
+    told = (
+        "" if problem.simulator.quality == "signed_epsilon" else "--quality signed_epsilon (it tells what is missing), "
+    )
+    others = "another --facet, more --variables (dz, rx, ry, rz or s1), another --preshape"
+    return f"{seen}Try {others}, {told}or more --trials."
 
 
 def drawn(problem: Any, outcome: Any) -> Any:

@@ -14,7 +14,7 @@ _QUALITIES: Final = {
     ),
     "signed_epsilon": (
         "Epsilon, the weakest push or twist that the contacts resist while their normal forces sum to 1, continued "
-        "below 0: the distance that is missing until every push is resisted."
+        "below 0 by what is missing until every push is resisted: -0.05 log(1 + distance / 0.05)."
     ),
     "volume": "Volume of the set of pushes and twists that the contacts can resist together. Higher is better.",
     "simox": "Epsilon relative to that of forces everywhere on the object, as the simulator of the thesis has it.",

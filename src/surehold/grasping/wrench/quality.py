@@ -7,7 +7,7 @@ wrench are in units of force. H is the convex hull of the contacts' wrenches, h(
 | name             | formula                                          | unit    | range    | 0 means
 |------------------|--------------------------------------------------|---------|----------|------------------------
 | `epsilon`        | max(0, min over unit u of h(u))                  | force   | >= 0     | some wrench not resisted
-| `signed_epsilon` | the same; outside minus the distance from 0 to H | force   | any      | on the border of closure
+| `signed_epsilon` | the same; outside - c log(1 + d / c)              | force   | any      | on the border of closure
 | `volume`         | volume of H in six dimensions, 0 without closure | force^6 | >= 0     | some wrench not resisted
 | `simox`          | as the simulator of the thesis, see simox.py     | none    | >= 0     | fewer than 2 contacts
 | `task`           | min over t of the largest s with -s t in H       | none    | >= 0     | some t not resisted
@@ -16,8 +16,10 @@ wrench are in units of force. H is the convex hull of the contacts' wrenches, h(
 | `balance`        | 1 - residual of six pushes, by quadratic program | none    | 0 to 1   | a push is not lessened
 
 epsilon: Ferrari and Canny 1992; task: Li and Sastry 1988; min_weight: Li et al. 2023; balance: Chen et al. 2024, see
-equilibrium.py. signed_epsilon, after Veiga and Bernardino 2012, also rates hands that touch nothing: minus the distance
-of the object from the fingers, the mean over them, in torque lengths, so that a model has a slope everywhere.
+equilibrium.py. signed_epsilon, after Veiga and Bernardino 2012, gives a model a slope everywhere: d is the distance from
+0 to H, and of a hand that touches nothing that of the object from the fingers, the mean over them, in torque lengths.
+Both reach some times the best epsilon; the logarithm (c = 0.05) keeps differences between grasps that hold visible
+beside those between grasps that do not.
 Of the task, gravity in 14 directions is the default: the quality is then the weight that is held however the hand is
 turned, divided by the sum of the normal forces.
 Round cones are the default. Cones of eight edges underrate epsilon by a few percent on average and by more where few
@@ -51,6 +53,15 @@ Array = NDArray[np.float64]
 _SIGNS = np.array([s for s in product((-1.0, 0.0, 1.0), repeat=3) if abs(s[0]) + abs(s[1]) + abs(s[2]) in (1.0, 3.0)])
 #: Towards the faces and the corners of a cube, (14, 3).
 GRAVITY_DIRECTIONS: Final = _SIGNS / np.linalg.norm(_SIGNS, axis=1)[:, None]
+
+_OUTSIDE: Final = (
+    0.05  # distance [force] at which the slope outside is half of that inside: the epsilon of a good grasp
+)
+
+
+def _lacking(distance: float) -> float:
+    """Return what `signed_epsilon` is at a distance >= 0 from closure, both in units of force."""
+    return -_OUTSIDE * float(np.log1p(distance / _OUTSIDE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +124,7 @@ class Measure:
     def value(self, points: Array, normals: Array, wrench: WrenchQuality) -> float:
         """Return the measure of at least two contacts, whose `wrench` is given."""
         if self.name == "signed_epsilon":
-            return wrench.signed_epsilon
+            return wrench.signed_epsilon if wrench.signed_epsilon > 0.0 else _lacking(-wrench.signed_epsilon)
         if self.name == "simox":
             return simox_quality(points, normals, self._object_space)
         if self.name == "task":
@@ -135,7 +146,7 @@ class Measure:
         """
         if self.name != "signed_epsilon":
             return 0.0
-        return -float(np.maximum(gaps.min(axis=1), 0.0).mean()) / self.obj.torque_length
+        return _lacking(float(np.maximum(gaps.min(axis=1), 0.0).mean()) / self.obj.torque_length)
 
     @cached_property
     def _object_space(self) -> ObjectWrenchSpace:
