@@ -3,9 +3,9 @@
 Mug and bottle in all seven variables, 150 trials of which 30 are initial, input noise of 3 % of the box. The optimizer
 is told `epsilon`, which is 0 wherever the grasp is not closed, or `signed_epsilon`, which falls there with what is
 missing, and without contacts with the distance (after the metric of Veiga and Bernardino 2012). Both begin with the
-same initial design of a seed. After 50, 100 and 150 trials the recommendation is executed 1,000 times with the noise, the
-same for both, and rated by `epsilon`, whatever was told. "Half" is the first trial whose epsilon is half of the highest
-of all runs on that object, or 151.
+same initial design of a seed. After 50, 100 and 150 trials the recommendation is executed 1,000 times with the noise,
+the same for both, and rated by `epsilon`, whatever was told. "Half" is the first trial whose epsilon is half of the
+highest of all runs on that object, or 151.
 
 Printed are means over seeds with standard errors, and differences paired by seed. A row is written for each run: it
 goes on where it was.

@@ -16,10 +16,10 @@ wrench are in units of force. H is the convex hull of the contacts' wrenches, h(
 | `balance`        | 1 - residual of six pushes, by quadratic program | none    | 0 to 1   | a push is not lessened
 
 epsilon: Ferrari and Canny 1992; task: Li and Sastry 1988; min_weight: Li et al. 2023; balance: Chen et al. 2024, see
-equilibrium.py. signed_epsilon, after Veiga and Bernardino 2012, gives a model a slope everywhere: d is the distance from
-0 to H, and of a hand that touches nothing that of the object from the fingers, the mean over them, in torque lengths.
-Both reach some times the best epsilon; the logarithm (c = 0.05) keeps differences between grasps that hold visible
-beside those between grasps that do not.
+equilibrium.py. signed_epsilon, after Veiga and Bernardino 2012, gives a model a slope everywhere: d is the distance
+from 0 to H, and of a hand that touches nothing that of the object from the fingers, the mean over them, in torque
+lengths. Both reach some times the best epsilon; the logarithm (c = 0.05) keeps differences between grasps that hold
+visible beside those between grasps that do not: benchmarks/signed_quality.py.
 Of the task, gravity in 14 directions is the default: the quality is then the weight that is held however the hand is
 turned, divided by the sum of the normal forces.
 Round cones are the default. Cones of eight edges underrate epsilon by a few percent on average and by more where few
