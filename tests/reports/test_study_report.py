@@ -59,6 +59,8 @@ def test_the_page_says_what_is_recommended(study):
     report = study_report(study)
     assert [c.label for c in report.candidates] == ["highest observed", "recommended"]
     assert report.recommended.predicted_mean == study.recommend().mean
+    told = dict(table_rows(report))["model: mean under the noise ± its uncertainty"]
+    assert [cell.split(" ± ")[0] for cell in told] == [f"{c.predicted_mean:.4f}" for c in report.candidates]
     page = render(report)
     assert "The highest peak (0.880) is not recommended: when the input is off, the model expects" in page
     assert "1 trial is still under way" in page

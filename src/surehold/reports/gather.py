@@ -28,7 +28,7 @@ from surehold.reports.surfaces import surfaces_of
 if TYPE_CHECKING:
     from surehold.grasping.pictures.scene import Scene as GraspScene
 
-__all__ = ["answers", "candidate", "drawn_scene", "report_of"]
+__all__ = ["answers", "candidate", "drawn_scene", "expected", "report_of"]
 
 _SHARES = (0.9, 0.99)  # of executions that succeed, of which the page says how sure they are
 _OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
@@ -87,6 +87,17 @@ def candidate(
         scene,
         minimized=result.optimizer.direction == "minimize",
     )
+
+
+def expected(result: Result, candidate: Candidate) -> Candidate:
+    """Return a candidate that was not queried again with what the model expects of it under the noise."""
+    best = result.recommendation
+    if candidate.label == "recommended":
+        return replace(
+            candidate, predicted_mean=best.mean, predicted_std=best.std, predicted_error=best.expectation.std
+        )
+    mean, std = result.optimizer.predict(candidate.x[None, :], under_noise=True)
+    return replace(candidate, predicted_mean=float(mean[0]), predicted_error=float(std[0]))
 
 
 def _of_constraints(result: Result) -> list[str]:

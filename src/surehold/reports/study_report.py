@@ -1,6 +1,5 @@
 """The report of a stored study: what it holds now, whoever made its trials."""
 
-from dataclasses import replace
 from typing import Any
 
 from surehold.optimization.maximization import Result
@@ -51,9 +50,4 @@ def study_report(study: RobotStudy) -> RunReport:
 def _candidate(result: Result, label: str, index: int) -> Candidate:
     """Return a trial with what the model expects of it where the input is off; the robot does not make it again."""
     found = gather.candidate(result, label, index, None)
-    if result.optimizer.input_noise is None:
-        return found
-    if label == "recommended":
-        return replace(found, predicted_mean=result.recommendation.mean, predicted_std=result.recommendation.std)
-    mean, _ = result.optimizer.predict(found.x[None, :], under_noise=True)
-    return replace(found, predicted_mean=float(mean[0]))
+    return found if result.optimizer.input_noise is None else gather.expected(result, found)
