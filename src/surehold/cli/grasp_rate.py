@@ -53,6 +53,7 @@ def _grasp_rate(
     from surehold.grasping.rating import rated_grasps
     from surehold.problems.grasp.stored import described_file, described_simulator, stored_words
     from surehold.store.atomic import checked_folder
+    from surehold.store.leftovers import listed_writes
 
     chosen = checked_formats(formats.split(","))
     if out:
@@ -117,7 +118,9 @@ def _grasp_rate(
         )
     if out:
         preshape = simulator.hand.preshapes[simulator.preshape]
-        for path in write_grasps(out, stored, body, hand, preshape, chosen, stored_words(words)):
+        with listed_writes(Path(out)):  # not replacing: the grasps of a run get a further format
+            written = write_grasps(out, stored, body, hand, preshape, chosen, stored_words(words))
+        for path in written:
             console.print(f"written: {path}", markup=False, soft_wrap=True)
 
 
