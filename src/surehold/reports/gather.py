@@ -173,9 +173,12 @@ def report_of(
     y, minimized, counted = result.y, optimizer.direction == "minimize", optimizer.outcome == "success"
     robust = np.full(y.size, np.nan)
     averaged = optimizer.input_noise is not None or box.uncontrolled is not None
-    for trial in result.trials:
-        if trial.recommendation is not None and trial.index < y.size and averaged:
-            robust[trial.index] = trial.recommendation.mean
+    for place, trial in enumerate(result.trials[: y.size]):
+        if trial.recommendation is not None and averaged:
+            robust[place] = trial.recommendation.mean
+    called = [trial.index for trial in result.trials] if len(result.trials) == y.size else list(range(y.size))
+    ids = () if called == list(range(y.size)) else tuple(called)
+    missing = ["Trials have the ids of the study; those that are missing have told nothing."] if ids else []
     return RunReport(
         title=title,
         variables=variables,
@@ -204,10 +207,16 @@ def report_of(
         warning=result.recommendation.warning,
         interrupted=result.interrupted,
         planned_trials=planned_trials,
-        notes=(*notes, *_of_constraints(result), *filter(None, [outliers_in_words(result.recommendation.outliers)])),
+        notes=(
+            *notes,
+            *missing,
+            *_of_constraints(result),
+            *filter(None, [outliers_in_words([called[i] for i in result.recommendation.outliers])]),
+        ),
         choices=choices or {},
         minimized=minimized,
         counted=counted,
+        ids=ids,
     )
 
 

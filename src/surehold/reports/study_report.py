@@ -27,9 +27,6 @@ def study_report(study: RobotStudy) -> RunReport:
     reason = study.paused or study.stopped()
     if reason:
         notes.append(f"The study is {'paused' if study.paused else 'stopped'}: {reason}.")
-    ids = [trial.number for trial in study.trials() if trial.state.is_finished()]
-    if ids != list(range(len(ids))):
-        notes.append("Trials are numbered from 0 in the order of their ids, of which some gave nothing to show.")
     rule = study.stop_rule
     rows = [space.decode(x) for x in result.optimizer.reached]
     names = [name for name in space.distributions if name not in box.names]
