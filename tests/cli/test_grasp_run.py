@@ -41,3 +41,19 @@ def test_the_preset_of_another_problem_is_refused(here, capsys):
     assert "preset of a grasp 'thesis-rkhs' is unknown" in " ".join(capsys.readouterr().err.split())
     assert run(["grasp", "bottle", "--preset", "thesis", "--contact", "patch"]) != 0
     assert "sets contact to 'single'" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_run_replaces_what_another_left_in_its_folder(here, capsys):
+    (here / "again").mkdir()
+    (here / "again" / "notes.txt").write_text("mine")
+    short = ["--trials", "3", "--initial", "3", "--noise", "none", "--method", "bo", "--out", "again"]
+    line = ["grasp", "bottle", "--facet", "right-front", *short]
+    assert run([*line, "--format", "graspgen,dexgraspbench"]) == 0
+    assert run(["grasp", "rate", "again/grasps.yaml", "--out", "again"]) == 0
+    assert (here / "again" / "graspgen.json").exists(), "a rating adds to what a run has written"
+    capsys.readouterr()
+    run(["grasp", "glass", *short])
+    assert "Removed what an earlier run had left there" in capsys.readouterr().out
+    names = {p.name for p in (here / "again").iterdir()}
+    assert names >= {"notes.txt", "glass.obj", "grasps.yaml", "report.html", "result.json"}
+    assert not names & {"graspgen.json", "dexgraspbench", "bottle.obj"}

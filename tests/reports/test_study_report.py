@@ -12,6 +12,8 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.reports.figures import figures
+from surehold.reports.files import result_data
 from surehold.reports.interactive import interactive_plots
 from surehold.reports.page import render, table_rows
 from surehold.reports.study_report import study_report
@@ -59,6 +61,8 @@ def test_the_page_says_what_is_recommended(study):
     report = study_report(study)
     assert [c.label for c in report.candidates] == ["highest observed", "recommended"]
     assert report.recommended.predicted_mean == study.recommend().mean
+    told = dict(table_rows(report))["model: mean under the noise ± its uncertainty"]
+    assert [cell.split(" ± ")[0] for cell in told] == [f"{c.predicted_mean:.4f}" for c in report.candidates]
     page = render(report)
     assert "The highest peak (0.880) is not recommended: when the input is off, the model expects" in page
     assert "1 trial is still under way" in page
@@ -203,3 +207,27 @@ def test_a_study_that_began_where_nothing_is_allowed_has_a_report(tmp_path):
     report = study_report(study)
     assert report.recommended.quality == 1.0
     assert "The highest observed trial gave 2, but is not allowed." in report.notes
+
+
+def test_trials_are_called_by_their_ids(tmp_path):
+    """One whose worker died has told nothing: the places of the others and their ids are not the same."""
+    settings = StudySettings(SearchSpace({"x": (0.0, 1.0)}), None, {}, {"n_initial": 3})
+    study = RobotStudy.create("ids", settings, str(tmp_path / "j.log"))
+    study.add({"x": 0.1}, 0.1)
+    dead = study.ask(worker="dead")
+    for x, y in ((0.3, 0.2), (0.5, 0.9), (0.7, 0.3), (0.52, 0.85)):
+        study.add({"x": x}, y)
+    report, answer = study_report(study), study.recommend()
+    assert dead.id == 1
+    assert report.numbers.tolist() == [0, 2, 3, 4, 5]
+    assert dict(table_rows(report))["trial, from 0"][-1] == str(answer.trial)
+    data = result_data(report)
+    assert data["trials"]["number"] == [0, 2, 3, 4, 5]
+    assert data["candidates"][-1]["trial"] == answer.trial
+    page = render(report)
+    assert f"(trial {answer.trial}, one of 5)" in page
+    assert "Trials have the ids of the study; those that are missing have told nothing." in page
+    assert '<td class="n">5</td>' in page
+    assert json.loads(interactive_plots(report)["surehold-1-progress"])["data"][0]["x"] == [0, 2, 3, 4, 5]
+    drawn = figures(report)["trace"].axes[0]
+    assert drawn.collections[0].get_offsets()[:, 0].tolist() == [0, 2, 3, 4, 5]

@@ -131,7 +131,7 @@ def test_counts_survive_export_and_import(tmp_path):
     ):
         (tmp_path / name).mkdir()
         other = created(tmp_path / name, outcome="success")
-        assert import_trials(other, found) == []
+        assert import_trials(other, found).left_out == []
         assert [(r["value"], r["of"]) for r in rows(other)] == [(0.7, 10), (0.0, 1), (None, 1)]
     with pytest.raises(InputError, match=r"'0\.7' is no share of '3' executions"):
         import_trials(other, [FormerTrial("line 2", {"x": 0.5}, "0.7", False, {}, "3")])

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
@@ -48,9 +49,11 @@ def _grasp_rate(
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats.gripper import stored_grasp
     from surehold.grasping.formats.writing import checked_formats, write_grasps
+    from surehold.grasping.pose_noise import PoseNoise
     from surehold.grasping.rating import rated_grasps
     from surehold.problems.grasp.stored import described_file, described_simulator, stored_words
     from surehold.store.atomic import checked_folder
+    from surehold.store.leftovers import listed_writes
 
     chosen = checked_formats(formats.split(","))
     if out:
@@ -96,16 +99,28 @@ def _grasp_rate(
         preshape = one.simulator.hand.preshapes[one.simulator.preshape]
         worth = one.grasp.quality if one.robust is None else one.robust.mean
         stored.append(stored_grasp(hand, one.grasp, preshape, one.stored.name, worth))
+    unsaid = "" if content.settings else " The file names no options; those not given have their defaults."
     console.print(
         f"{file}: {len(rated)} grasps of hand {hand.name} on {body.name}, {simulator.quality} with "
-        f"{simulator.contact} contacts and friction {simulator.friction:g}{squeeze}.",
+        f"{simulator.contact} contacts and friction {simulator.friction:g}{squeeze}.{unsaid}",
         markup=False,
         soft_wrap=True,
     )
     console.print(table)
+    if samples:
+        bounds = PoseNoise()
+        console.print(
+            f"off: {samples} poses of each grasp that are off by up to {1e3 * bounds.shift:g} mm along and "
+            f"{np.degrees(bounds.turn):g} degrees about each axis. The confidence of a run's own file is the mean "
+            "under the noise of that run.",
+            markup=False,
+            soft_wrap=True,
+        )
     if out:
         preshape = simulator.hand.preshapes[simulator.preshape]
-        for path in write_grasps(out, stored, body, hand, preshape, chosen, stored_words(words)):
+        with listed_writes(Path(out)):  # not replacing: the grasps of a run get a further format
+            written = write_grasps(out, stored, body, hand, preshape, chosen, stored_words(words))
+        for path in written:
             console.print(f"written: {path}", markup=False, soft_wrap=True)
 
 

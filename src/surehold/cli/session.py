@@ -28,6 +28,7 @@ from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.verdict import number, verdict
 from surehold.store.atomic import checked_folder
+from surehold.store.leftovers import listed_writes
 
 __all__ = ["NO_SUCCESS", "Kept", "folder_for", "run_session"]
 
@@ -177,9 +178,18 @@ def run_session(
                 outcomes={} if _any_above(result, success_above) else outcomes(result),
                 advice=advice,
             )
-            path = files.write_run(report, folder)
-            also_write(report, folder)
+            with listed_writes(folder, replacing=True) as removed:
+                path = files.write_run(report, folder)
+                also_write(report, folder)
     _show(report, path, time.perf_counter() - started, console)
+    if removed:
+        more = ", ..." * (len(removed) > 3)
+        console.print(
+            f"Removed what an earlier run had left there: {len(removed)} file{'s' * (len(removed) > 1)} "
+            f"({', '.join(removed[:3])}{more}).",
+            markup=False,
+            soft_wrap=True,
+        )
     if open_report:
         webbrowser.open(path.resolve().as_uri())
     return report

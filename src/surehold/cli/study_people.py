@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -10,6 +10,8 @@ from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, say
 from surehold.errors import InputError
 
 __all__ = ["commands"]
+
+_SHOWN: Final = 10  # trials that a line names
 
 Id = Annotated[int, typer.Argument(help="Of the trial, as ask printed it.")]
 Reason = Annotated[str, typer.Option(help="Why; shown to whoever asks.", show_default=False)]
@@ -118,7 +120,7 @@ def import_trials(
     storage: Storage = "",
     as_json: Json = False,
 ) -> None:
-    """Take trials over that were made before, from a CSV file or another study."""
+    """Take trials over that were made before, from a CSV file or another study; each is taken once."""
     from surehold.errors import InputError, unknown_name
     from surehold.studies import warm_start
     from surehold.studies.parameter_text import parse_assignments
@@ -137,7 +139,27 @@ def import_trials(
     else:
         former = warm_start.former_study(study, source)
         found = warm_start.trials_of_study(former, names, target.settings.direction, outputs)
-    left_out = warm_start.import_trials(target, found, skip_bad=skip_bad)
-    count = len(found) - len(left_out)
-    lines = [f"{count} trial{'s' * (count != 1)} imported into {name}", *(f"left out: {why}" for why in left_out)]
-    say({"imported": count, "left_out": left_out}, "\n".join(lines), as_json)
+    made = warm_start.import_trials(target, found, skip_bad=skip_bad)
+    count = made.values + len(made.failed)
+    lines = [f"{count} trial{'s' * (count != 1)} imported into {name}"]
+    if count:
+        lines[0] += f": {made.values} with a value"
+    if made.failed:
+        lines[0] += f", {len(made.failed)} failed: {_first(made.failed)}"
+    if made.already:
+        lines.append(f"imported before and not again: {len(made.already)} ({_first(made.already)})")
+    lines += [f"left out: {why}" for why in made.left_out]
+    answer = {
+        "imported": count,
+        "values": made.values,
+        "failed": made.failed,
+        "already": made.already,
+        "left_out": made.left_out,
+    }
+    say(answer, "\n".join(lines), as_json)
+
+
+def _first(texts: list[str]) -> str:
+    """Return texts in one line, many of them cut short."""
+    more = len(texts) - _SHOWN
+    return ", ".join(texts[:_SHOWN]) + (f", and {more} more (--json names all)" if more > 0 else "")

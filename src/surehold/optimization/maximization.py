@@ -34,7 +34,7 @@ class Trial:
     Attributes
     ----------
     index
-        0 for the first that finished.
+        0 for the first that finished; of a stored study its id.
     x : (d,)
         In the box's units.
     y
@@ -118,7 +118,8 @@ class Result:
             raise SureholdError("to_dataframe needs pandas; install it: pip install pandas.") from None
         box = self.optimizer.box
         columns = [variable.name for variable in box.variables]
-        table = pandas.DataFrame([box.as_dict(trial.x) for trial in self.trials], columns=columns)
+        index = pandas.Index([trial.index for trial in self.trials], name="trial")
+        table = pandas.DataFrame([box.as_dict(trial.x) for trial in self.trials], index, columns)
         rows: list[tuple[str, list[Any]]] = [("value", [trial.y for trial in self.trials])]
         named = dict.fromkeys(name for trial in self.trials for name in trial.outputs)
         rows += [(name, [trial.outputs.get(name, np.nan) for trial in self.trials]) for name in named]
@@ -127,7 +128,6 @@ class Result:
         rows += [(name, [getattr(trial, name) for trial in self.trials]) for name in ("failure", "best", "seconds")]
         for name, values in rows:
             table[name if name not in table else f"trial {name}"] = values
-        table.index.name = "trial"
         return table
 
     def plot(self, function: Callable[[Any], float] | None = None) -> "Figure":

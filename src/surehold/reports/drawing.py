@@ -222,7 +222,7 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
 
 def draw_trace(axes: "Axes", report: RunReport) -> None:
     """Draw best and robust value by trial, over the values of the single trials."""
-    k = np.arange(report.y.size)
+    k = report.numbers
     failed = report.failed
     told = {"s": 8, "color": PALETTE["muted"], "alpha": 0.7, "gid": "trials-told", "label": "trial", "zorder": 2.0}
     axes.scatter(k[~failed], report.y[~failed], **told)
@@ -249,11 +249,12 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             label="recommended: expected under the noise",
         )
     if 0 < report.n_initial < report.y.size:
-        axes.axvspan(-0.5, report.n_initial - 0.5, color=PALETTE["grid"], alpha=0.45, linewidth=0, zorder=0)
-        wide = report.n_initial > 0.25 * report.y.size  # the words fit into the band; else they begin in it
+        first = float(k[report.n_initial]) - 0.5  # the first later trial
+        axes.axvspan(-0.5, first, color=PALETTE["grid"], alpha=0.45, linewidth=0, zorder=0)
+        wide = first + 0.5 > 0.25 * (k[-1] + 1)  # the words fit into the band; else they begin in it
         axes.annotate(
             "initial design",
-            (report.n_initial / 2 - 0.5 if wide else -0.5, 1.0),
+            (first / 2 - 0.25 if wide else -0.5, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0 if wide else 3, -3),
             textcoords="offset points",
@@ -263,7 +264,7 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             color=PALETTE["muted"],
         )
     axes.margins(y=0.12)
-    axes.set(xlabel="trial, from 0", ylabel=report.quality_name, xlim=(-0.5, max(report.y.size - 0.5, 0.6)))
+    axes.set(xlabel="trial, from 0", ylabel=report.quality_name, xlim=(-0.5, max(k[-1] + 0.5, 0.6) if k.size else 0.6))
     axes.grid(axis="y", linewidth=0.6)
     axes.set_axisbelow(True)
     _legend_above(axes)

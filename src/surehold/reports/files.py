@@ -53,19 +53,19 @@ def result_data(report: RunReport) -> dict[str, Any]:
             "input_noise_covariance": report.noise,
             "quality": report.quality_name,
             "n_initial": report.n_initial,
-            "trials": {"x": report.X, "y": report.y},
+            "trials": {"number": report.numbers, "x": report.X, "y": report.y},
             "best": report.best_trace,
             "robust": report.robust_trace,
-            "candidates": [_candidate(c) for c in report.candidates],
+            "candidates": [_candidate(report, c) for c in report.candidates],
         }
     )
 
 
-def _candidate(candidate: Candidate) -> dict[str, Any]:
+def _candidate(report: RunReport, candidate: Candidate) -> dict[str, Any]:
     return {
         "label": candidate.label,
         "x": candidate.x,
-        "trial": candidate.trial,
+        "trial": None if candidate.trial is None else report.numbers[candidate.trial],
         "quality": candidate.quality,
         "mean": candidate.mean,
         "worst": candidate.worst,

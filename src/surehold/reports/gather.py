@@ -28,7 +28,7 @@ from surehold.reports.surfaces import surfaces_of
 if TYPE_CHECKING:
     from surehold.grasping.pictures.scene import Scene as GraspScene
 
-__all__ = ["answers", "candidate", "drawn_scene", "report_of"]
+__all__ = ["answers", "candidate", "drawn_scene", "expected", "report_of"]
 
 _SHARES = (0.9, 0.99)  # of executions that succeed, of which the page says how sure they are
 _OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
@@ -87,6 +87,17 @@ def candidate(
         scene,
         minimized=result.optimizer.direction == "minimize",
     )
+
+
+def expected(result: Result, candidate: Candidate) -> Candidate:
+    """Return a candidate that was not queried again with what the model expects of it under the noise."""
+    best = result.recommendation
+    if candidate.label == "recommended":
+        return replace(
+            candidate, predicted_mean=best.mean, predicted_std=best.std, predicted_error=best.expectation.std
+        )
+    mean, std = result.optimizer.predict(candidate.x[None, :], under_noise=True)
+    return replace(candidate, predicted_mean=float(mean[0]), predicted_error=float(std[0]))
 
 
 def _of_constraints(result: Result) -> list[str]:
@@ -162,9 +173,12 @@ def report_of(
     y, minimized, counted = result.y, optimizer.direction == "minimize", optimizer.outcome == "success"
     robust = np.full(y.size, np.nan)
     averaged = optimizer.input_noise is not None or box.uncontrolled is not None
-    for trial in result.trials:
-        if trial.recommendation is not None and trial.index < y.size and averaged:
-            robust[trial.index] = trial.recommendation.mean
+    for place, trial in enumerate(result.trials[: y.size]):
+        if trial.recommendation is not None and averaged:
+            robust[place] = trial.recommendation.mean
+    called = [trial.index for trial in result.trials] if len(result.trials) == y.size else list(range(y.size))
+    ids = () if called == list(range(y.size)) else tuple(called)
+    missing = ["Trials have the ids of the study; those that are missing have told nothing."] if ids else []
     return RunReport(
         title=title,
         variables=variables,
@@ -193,10 +207,16 @@ def report_of(
         warning=result.recommendation.warning,
         interrupted=result.interrupted,
         planned_trials=planned_trials,
-        notes=(*notes, *_of_constraints(result), *filter(None, [outliers_in_words(result.recommendation.outliers)])),
+        notes=(
+            *notes,
+            *missing,
+            *_of_constraints(result),
+            *filter(None, [outliers_in_words([called[i] for i in result.recommendation.outliers])]),
+        ),
         choices=choices or {},
         minimized=minimized,
         counted=counted,
+        ids=ids,
     )
 
 

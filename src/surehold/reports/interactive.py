@@ -30,7 +30,7 @@ def interactive_plots(report: RunReport) -> dict[str, str]:
 
 
 def _progress(report: RunReport) -> dict[str, Any]:
-    number = np.arange(report.y.size)
+    number = report.numbers
     data = [
         _points(number, report.y, "trial", {"color": _TRIAL, "size": 6}),
         _curve(number, report.best_trace, f"{report.extreme} observed", _HIGHEST, shape="hv"),

@@ -239,7 +239,8 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
         rows.append(row("pose", lambda c: c.pose or "–"))
     if any(c.status for c in every):
         rows.append(row("status", lambda c: c.status or "–"))
-    rows.append(row("trial, from 0", lambda c: "–" if c.trial is None else str(c.trial)))
+    numbers = report.numbers
+    rows.append(row("trial, from 0", lambda c: "–" if c.trial is None else str(numbers[c.trial])))
     if report.counted:
         rows.append(row("share of the trial that succeeded", lambda c: number(c.quality, 4)))
         if any(c.values.size for c in every):
@@ -296,7 +297,7 @@ def _trials(report: RunReport) -> list[dict[str, Any]]:
         failed = not np.isfinite(y)
         rows.append(
             {
-                "number": i,
+                "number": int(report.numbers[i]),
                 "x": [coordinate(v, value, 4) for v, value in zip(report.variables, x, strict=True)],
                 "choices": [texts[i] for texts in report.choices.values()],
                 "y": "failed" if failed else worth(report, float(y), 4),

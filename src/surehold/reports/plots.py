@@ -10,7 +10,7 @@ from surehold.optimization.maximization import Result
 from surehold.problems.function import Function
 from surehold.problems.perturbation import robust_score
 from surehold.reports import figures, files, gather
-from surehold.reports.run_report import Candidate, RunReport
+from surehold.reports.run_report import RunReport
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,7 +61,7 @@ def result_report(result: Result, function: Callable[[Any], float] | None = None
             problem = Function(function if box.plain else lambda x: function(box.as_dict(x)), box)
             score = robust_score(problem, result.X[index], noise, _REQUERIES, optimizer.seed)
         found = gather.candidate(result, label, index, score)
-        candidates.append(found if score is not None or not disturbed else _expected(result, found))
+        candidates.append(found if score is not None or not disturbed else gather.expected(result, found))
     plain = [box.as_dict(x) for x in result.X]
     texts = [variable.name for variable in box.variables if variable.name not in box.names]
     units = {v.name: "log" for v in box.variables if v.name in box.names and getattr(v, "log", False)}
@@ -76,14 +76,3 @@ def result_report(result: Result, function: Callable[[Any], float] | None = None
         choices={name: tuple(str(row[name]) for row in plain) for name in texts},
         hidden=[name for name in box.names if name not in [variable.name for variable in box.variables]],
     )
-
-
-def _expected(result: Result, candidate: Candidate) -> Candidate:
-    """Return a candidate with what the model expects of it."""
-    best = result.recommendation
-    if candidate.label == "recommended":
-        return replace(
-            candidate, predicted_mean=best.mean, predicted_std=best.std, predicted_error=best.expectation.std
-        )
-    mean, std = result.optimizer.predict(candidate.x[None, :], under_noise=True)
-    return replace(candidate, predicted_mean=float(mean[0]), predicted_error=float(std[0]))

@@ -133,7 +133,7 @@ class Candidate:
     label: str  #: "highest observed" ("lowest observed" where values are minimized) or "recommended"
     x: Floats  #: (d,) in the units of the box
     quality: float  #: value of the trial at x, undisturbed
-    trial: int | None = None  #: index of that trial, from 0
+    trial: int | None = None  #: place of that trial among those of the run, from 0
     values: Floats = field(default_factory=lambda: np.empty(0))  #: (q,) outcomes of the re-queries; empty without noise
     points: Floats = field(default_factory=lambda: np.empty((0, 0)))  #: (q + failed, d) where they were made
     n_failed: int = 0  #: re-queries that gave no value
@@ -219,6 +219,7 @@ class RunReport:
     notes: tuple[str, ...] = ()
     choices: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: parameters that are no numbers: (n,) each
     minimized: bool = False  #: whether lower values are better
+    ids: tuple[int, ...] = ()  #: what the trials are called, (n,); by their places, from 0, where empty
     counted: bool = False  #: whether values are shares of executions that succeeded, 1 or 0 of a single one
 
     def __post_init__(self):
@@ -230,6 +231,8 @@ class RunReport:
             )
         if self.robust_trace is not None and self.robust_trace.shape != (n,):
             raise InputError(f"robust_trace has shape {self.robust_trace.shape}; it needs ({n},).")
+        if self.ids and len(self.ids) != n:
+            raise InputError(f"report of {n} trials has {len(self.ids)} ids; give one for each, or none.")
         if not self.candidates:
             raise InputError("a report needs at least one candidate; give the highest observed trial.")
         for candidate in self.candidates:
@@ -255,6 +258,11 @@ class RunReport:
             return f"no success: the {f'{self.extreme} trial' if candidate is self.observed else 'point shown'}"
         alone = len(self.candidates) == 1 and not self.counted
         return f"{self.extreme} observed = recommended" if alone else candidate.label
+
+    @property
+    def numbers(self) -> NDArray[np.intp]:
+        """What the trials are called, (n,): their ids in a study, or their places, from 0."""
+        return np.array(self.ids, dtype=np.intp) if self.ids else np.arange(self.y.size)
 
     @property
     def failed(self) -> NDArray[np.bool_]:

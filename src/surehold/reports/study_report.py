@@ -1,6 +1,5 @@
 """The report of a stored study: what it holds now, whoever made its trials."""
 
-from dataclasses import replace
 from typing import Any
 
 from surehold.optimization.maximization import Result
@@ -28,9 +27,6 @@ def study_report(study: RobotStudy) -> RunReport:
     reason = study.paused or study.stopped()
     if reason:
         notes.append(f"The study is {'paused' if study.paused else 'stopped'}: {reason}.")
-    ids = [trial.number for trial in study.trials() if trial.state.is_finished()]
-    if ids != list(range(len(ids))):
-        notes.append("Trials are numbered from 0 in the order of their ids, of which some gave nothing to show.")
     rule = study.stop_rule
     rows = [space.decode(x) for x in result.optimizer.reached]
     names = [name for name in space.distributions if name not in box.names]
@@ -51,9 +47,4 @@ def study_report(study: RobotStudy) -> RunReport:
 def _candidate(result: Result, label: str, index: int) -> Candidate:
     """Return a trial with what the model expects of it where the input is off; the robot does not make it again."""
     found = gather.candidate(result, label, index, None)
-    if result.optimizer.input_noise is None:
-        return found
-    if label == "recommended":
-        return replace(found, predicted_mean=result.recommendation.mean, predicted_std=result.recommendation.std)
-    mean, _ = result.optimizer.predict(found.x[None, :], under_noise=True)
-    return replace(found, predicted_mean=float(mean[0]))
+    return found if result.optimizer.input_noise is None else gather.expected(result, found)

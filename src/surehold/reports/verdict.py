@@ -101,7 +101,7 @@ def _of_the_run(report: RunReport) -> Verdict:
             )
         return Verdict(
             f"The best{' feasible' * extreme.endswith('feasible')} {name} found is {said(highest.quality)}.",
-            f"It was met at {coordinates(report, highest)} ({_trial(highest)} of {report.y.size}). {why}",
+            f"It was met at {coordinates(report, highest)} ({_trial_of(report, highest)}). {why}",
             False,
         )
     if len(report.candidates) == 1:
@@ -170,7 +170,7 @@ def _of_nothing(report: RunReport) -> Verdict:
     if report.infeasible:
         return Verdict(
             report.infeasible[:1].upper() + report.infeasible[1:],
-            f"The point shown ({_trial(report.recommended)} of {report.y.size}) comes nearest and is no answer. "
+            f"The point shown ({_trial_of(report, report.recommended)}) comes nearest and is no answer. "
             "Widen the limits, or the box.",
             False,
         )
@@ -191,6 +191,7 @@ def _of_successes(report: RunReport) -> Verdict:
     again = ""
     if answer.values.size:
         again = f"; of {answer.values.size} tried again when {report.disturbance}, {percent(answer.mean)} succeeded"
+    where = f"{coordinates(report, answer)} ({_trial(report, answer)})"
     sure = " ".join(f"The model is {value} {name}." for name, value in answer.details.items() if name[:5] == "sure ")
     share = percent(float(told.mean()))
     made = f"{share} of the {told.size} trials succeeded"
@@ -198,7 +199,7 @@ def _of_successes(report: RunReport) -> Verdict:
         made = f"The {told.size} trials succeeded in {share} of their executions on average"
     return Verdict(
         f"The recommended point is {expected}{again}.",
-        f"It is {coordinates(report, answer)} ({_trial(answer)}). {made}, those made to learn included. {sure}".strip(),
+        f"It is {where}. {made}, those made to learn included. {sure}".strip(),
         False,
     )
 
@@ -246,15 +247,15 @@ def _of_the_model(report: RunReport) -> Verdict:
         f"The {peak} ({said(highest.quality)}) is not recommended: when {off}, the model expects "
         f"{said(highest.predicted_mean)} of it, and {expected} of the recommended point."
     )
-    where = f"Recommended is {coordinates(report, answer)} ({_trial(answer)} of {report.y.size}). {text}"
+    where = f"Recommended is {coordinates(report, answer)} ({_trial_of(report, answer)}). {text}"
     return Verdict(headline, where, True)
 
 
 def _sentence(report: RunReport, candidate: Candidate, subject: str) -> str:
     n, said = candidate.values.size, _said(report)
     text = (
-        f"{subject} ({_trial(candidate)}) reached a {report.quality_name} of {said(candidate.quality)} when hit "
-        f"exactly. Queried again {n} times with perturbed inputs it gave {said(candidate.mean)} on average "
+        f"{subject} ({_trial(report, candidate)}) reached a {report.quality_name} of {said(candidate.quality)} when "
+        f"hit exactly. Queried again {n} times with perturbed inputs it gave {said(candidate.mean)} on average "
         f"({_change(candidate)}), {said(candidate.worst)} at worst."
     )
     if halved(candidate):
@@ -301,5 +302,10 @@ def _difference(report: RunReport) -> tuple[float, float]:
     return gap, math.hypot(answer.std / math.sqrt(a.size), highest.std / math.sqrt(h.size))
 
 
-def _trial(candidate: Candidate) -> str:
-    return "the model's choice" if candidate.trial is None else f"trial {candidate.trial}"
+def _trial(report: RunReport, candidate: Candidate) -> str:
+    return "the model's choice" if candidate.trial is None else f"trial {report.numbers[candidate.trial]}"
+
+
+def _trial_of(report: RunReport, candidate: Candidate) -> str:
+    """Return which of how many trials it was; ids of a study may run higher than the number of trials shown."""
+    return f"{_trial(report, candidate)}{', one' * bool(report.ids)} of {report.y.size}"

@@ -1,16 +1,31 @@
 """Files that are written whole or not at all, whoever reads or writes them at the same time."""
 
+import hashlib
 import itertools
 import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Final
 
 from surehold.errors import InputError
 
-__all__ = ["checked_folder", "new_folder", "replacing", "write_file"]
+__all__ = ["checked_folder", "new_folder", "noted_writes", "replacing", "write_file"]
+
+_NOTED: Final[ContextVar[dict[Path, str] | None]] = ContextVar("noted", default=None)
+
+
+@contextmanager
+def noted_writes() -> Iterator[dict[Path, str]]:
+    """Yield the SHA-256 of each file that the block writes with `write_file`, by its resolved path."""
+    written: dict[Path, str] = {}
+    token = _NOTED.set(written)
+    try:
+        yield written
+    finally:
+        _NOTED.reset(token)
 
 
 @contextmanager
@@ -40,13 +55,17 @@ def write_file(path: Path, content: str | bytes) -> None:
     InputError
         If the file cannot be written; what was there before stays.
     """
+    data = content.encode("utf-8") if isinstance(content, str) else content
     try:
         with replacing(path) as file:
-            file.write(content.encode("utf-8") if isinstance(content, str) else content)
+            file.write(data)
     except OSError as error:
         there = path.parent.is_dir()
         advice = "free the place or choose another" if there else f"make the folder '{path.parent}' or choose another"
         raise InputError(f"file '{path}' cannot be written ({error.strerror or error}); {advice}.") from None
+    noted = _NOTED.get()
+    if noted is not None:
+        noted[path.resolve()] = hashlib.sha256(data).hexdigest()
 
 
 def checked_folder(folder: str | Path) -> Path:

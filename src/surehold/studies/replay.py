@@ -19,6 +19,8 @@ _REPLAYED: Final = 60  # recommendations that are computed again
 def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
     """Return the told trials of a study as a `Result`; recommendations at up to 60 of them, evenly spread.
 
+    The trials have the ids of the study, of which some may have told nothing.
+
     Raises
     ------
     InputError
@@ -54,5 +56,5 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
         attributes = stored[int(history.numbers[i])].user_attrs
         failure = "" if np.isfinite(history.y[i]) else attributes.get(VETOED) or attributes.get(NOTE) or "failed"
         x, y = history.X[i], float(values[i])
-        trials.append(Trial(i, x, y, failure, float(best[i]), recommendations.get(i + 1), 0.0))
+        trials.append(Trial(int(history.numbers[i]), x, y, failure, float(best[i]), recommendations.get(i + 1), 0.0))
     return Result(optimizer, tuple(trials), recommendations[n], interrupted)

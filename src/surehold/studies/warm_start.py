@@ -1,9 +1,10 @@
 """Trials made before: from a CSV file or another study, with columns mapped and the checks of `tell`.
 
-All rows are checked before the first is stored.
+All rows are checked before the first is stored. A trial that an earlier import stored is not stored again.
 """
 
 import csv
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,13 +17,13 @@ from surehold.errors import InputError
 from surehold.optimization.limits import checked_outputs
 from surehold.studies.csv_cells import cell_text
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED
-from surehold.studies.ledger import checked_value
+from surehold.studies.ledger import NOTE, checked_value
 from surehold.studies.robot import RobotStudy
 from surehold.studies.settings import SETTINGS
 from surehold.studies.storage import open_storage
 from surehold.studies.success import answer, count_told
 
-__all__ = ["FormerTrial", "former_study", "import_trials", "trials_of_csv", "trials_of_study"]
+__all__ = ["FormerTrial", "Imported", "former_study", "import_trials", "trials_of_csv", "trials_of_study"]
 
 _FAILED = {"fail", "failed", "vetoed", "pruned"}
 _UNFINISHED = {"running", "waiting"}
@@ -42,6 +43,26 @@ class FormerTrial(NamedTuple):
     """executions of which the value is the share that succeeded, where that is known"""
     outputs: Mapping[str, Any] | None = None
     """further outputs; None for one that was not measured"""
+    why: str = ""
+    """of a failed trial, what says that it failed, such as "has no value" """
+
+    @property
+    def place(self) -> str:
+        """Where it was found, without the name of the file or study: "line 3"."""
+        return self.where.rpartition(", ")[2]
+
+
+class Imported(NamedTuple):
+    """What became of former trials."""
+
+    values: int
+    """trials stored with a value"""
+    failed: list[str]
+    """trials stored as failed: which, and why, such as "line 4 has no value" """
+    already: list[str]
+    """trials that an earlier import stored, such as "line 3" """
+    left_out: list[str]
+    """trials that do not fit, and why"""
 
 
 def trials_of_csv(
@@ -63,7 +84,7 @@ def trials_of_csv(
     Raises
     ------
     InputError
-        If the file cannot be read, or a column is missing or there twice.
+        If the file cannot be read, its columns are not separated by commas, or one is missing or there twice.
     """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
@@ -71,11 +92,7 @@ def trials_of_csv(
         raise InputError(f"file {path!r} cannot be read: {getattr(error, 'strerror', None) or error}.") from None
     reader = csv.DictReader(text.splitlines())
     columns = list(reader.fieldnames or [])
-    for column in (*names.values(), value):
-        if column not in columns:
-            raise InputError(f"file {path!r} has no column {column!r}; it has {', '.join(columns) or 'none'}.")
-        if columns.count(column) > 1:
-            raise InputError(f"file {path!r} has {columns.count(column)} columns {column!r}; leave one.")
+    _check_columns(path, columns, names, value)
     found = []
     measured = {name: column for name in outputs for column in (name, f"output_{name}") if column in columns}
     for row in reader:
@@ -90,11 +107,38 @@ def trials_of_csv(
         }
         parameters = {name: cell_text((row[column] or "").strip()) for name, column in names.items()}
         failed = state in _FAILED or not told
+        why = f"has state {state}" if state in _FAILED else "has no value"
         where = f"{Path(path).name}, line {reader.line_num}"
         of = None if failed else (row.get("of") or "").strip() or None
         told_outputs = {name: cell_text((row[column] or "").strip()) or None for name, column in measured.items()}
-        found.append(FormerTrial(where, parameters, None if failed else told, failed, reached, of, told_outputs))
+        trial = FormerTrial(where, parameters, None if failed else told, failed, reached, of, told_outputs)
+        found.append(trial._replace(why=why if failed else ""))
     return found
+
+
+def _check_columns(path: str, columns: list[str], names: Mapping[str, str], value: str) -> None:
+    """Raise InputError where a column is missing or there twice; the message says what the file's may mean."""
+    for separator, called in ((";", "semicolons"), ("\t", "tabs")):
+        if len(columns) == 1 and separator in columns[0]:
+            raise InputError(
+                f"file {path!r} separates its columns by {called} ({columns[0][:60]!r}); save it as CSV with commas "
+                "between the columns and points in the numbers."
+            )
+    for parameter, column in (dict(names) | {"": value}).items():
+        if column not in columns:
+            hint, like = "", next((there for there in columns if _bare(there) == _bare(column)), None)
+            if like is not None:
+                option, given = ("--columns", f"{parameter}={like}") if parameter else ("--value", like)
+                quoted = given if re.fullmatch(r"[\w=.-]+", given) else f'"{given}"'
+                hint = f" Is it {like!r}? Then give {option} {quoted}."
+            raise InputError(f"file {path!r} has no column {column!r}; it has {', '.join(columns) or 'none'}.{hint}")
+        if columns.count(column) > 1:
+            raise InputError(f"file {path!r} has {columns.count(column)} columns {column!r}; leave one.")
+
+
+def _bare(column: str) -> str:
+    """Return the name of a column in small letters, without a unit in brackets behind it."""
+    return re.sub(r"[\[(][^\[(]*[\])]\s*$", "", column).strip().casefold()
 
 
 def trials_of_study(
@@ -120,12 +164,13 @@ def trials_of_study(
         of = None if failed else trial.user_attrs.get(EXECUTIONS)
         told = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
         kept = {name: told.get(name) for name in outputs if name in told or name in watched}
-        found.append(FormerTrial(where, parameters, value, failed, reached, of, kept))
+        why = "failed" if failed else ""
+        found.append(FormerTrial(where, parameters, value, failed, reached, of, kept, why))
     return found
 
 
-def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: bool = False) -> list[str]:
-    """Store former trials in a study, and return why some were left out.
+def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: bool = False) -> Imported:
+    """Store former trials in a study; those that were imported before, with the same answer, stay as they are.
 
     Parameters
     ----------
@@ -137,21 +182,29 @@ def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: boo
     InputError
         If a trial does not fit: a parameter is missing or outside its range, or the value is not finite.
     """
-    good, left_out = [], []
+    good: list[FormerTrial] = []
+    found = Imported(0, [], [], [])
     settings = study.settings.optimizer
+    stored = {_identity(t.user_attrs.get(NOTE), t.params, t.values[0] if t.values else None) for t in study.trials()}
     for trial in trials:
         try:
             if trial.of is not None and settings.get("outcome") == "success":
                 trial = trial._replace(value=count_told(trial.value, trial.of))
-            checked_value(answer(settings, trial.value)[0], trial.failed)
+            number = checked_value(answer(settings, trial.value)[0], trial.failed)
             checked_outputs(study.limits, trial.outputs, trial.failed)
             commanded = study.settings.space.check(trial.parameters)
             study.settings.space.check_reached(commanded, trial.reached)
-            good.append(trial)
+            if _identity(_note(trial), commanded, number) in stored:
+                found.already.append(trial.place)
+            else:
+                good.append(trial)
         except InputError as error:
             if not skip_bad:
-                raise InputError(f"{trial.where}: {error} Nothing was imported.") from None
-            left_out.append(f"{trial.where}: {error}")
+                raise InputError(
+                    f"{trial.where}: {error} Nothing was imported; mend it, or leave out all that does not fit "
+                    "with --skip-bad."
+                ) from None
+            found.left_out.append(f"{trial.where}: {error}")
     for trial in good:
         study.add(
             trial.parameters,
@@ -159,9 +212,19 @@ def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: boo
             failed=trial.failed,
             reached=trial.reached or None,
             constraints=trial.outputs,
-            note=f"from {trial.where}",
+            note=_note(trial),
         )
-    return left_out
+    failed = [f"{trial.place} {trial.why or 'failed'}" for trial in good if trial.failed]
+    return found._replace(values=len(good) - len(failed), failed=failed)
+
+
+def _note(trial: FormerTrial) -> str:
+    return f"from {trial.where}"
+
+
+def _identity(note: str | None, parameters: Mapping[str, Any], value: float | None) -> tuple[Any, ...]:
+    """Return what two imports of one trial have in common."""
+    return note, tuple(sorted(parameters.items())), value
 
 
 def former_study(name: str, storage: str) -> Study:

@@ -17,11 +17,14 @@ JOINTS = ("a", "b", "c")
 ZERO = np.array([0.0, 0, 0, 1, 0, 0, 0])
 
 
+SETTINGS = {"contact": "single", "friction": 0.7}
+
+
 def test_numpy_reads_what_is_written_and_it_comes_back(tmp_path):
     turn = (0.5, 0.5, -0.5, 0.5)
     opened, closed, squeeze = {"a": 0.0, "c": 0.1}, {"c": 0.3, "a": 0.2}, {"a": 0.25, "c": 0.35}
     grasp = StoredGrasp("one", 0.7, (0.1, 0.2, 0.3), turn, closed, opened, squeeze, -0.5, 0.06)
-    write_dexgraspbench_files(tmp_path, GraspFile("mug", "", (grasp,), "objects/mug", 2.0), JOINTS)
+    write_dexgraspbench_files(tmp_path, GraspFile("mug", "", (grasp,), "objects/mug", 2.0, settings=SETTINGS), JOINTS)
     row = np.load(tmp_path / "one.npy", allow_pickle=True).item()
     np.testing.assert_array_equal(row["grasp_qpos"], [0.1, 0.2, 0.3, *turn, 0.2, 0.0, 0.3])  # by name, in the order
     np.testing.assert_array_equal(row["pregrasp_qpos"][7:], [0.0, 0.0, 0.1])
@@ -29,6 +32,7 @@ def test_numpy_reads_what_is_written_and_it_comes_back(tmp_path):
     assert (row["obj_path"], row["obj_scale"], row["obj_pose"].tolist()) == ("objects/mug", 2.0, ZERO.tolist())
     back = read_grasps(tmp_path)
     assert (back.object_file, back.object_scale, back.gripper_frame) == ("objects/mug", 2.0, "")
+    assert back.settings == SETTINGS
     (read,) = back.grasps
     assert read.joints == {"a": 0.2, "b": 0.0, "c": 0.3}
     assert read.pose.matrix == pytest.approx(grasp.pose.matrix)
@@ -76,6 +80,10 @@ def test_a_folder_is_read_in_order_and_holds_one_object(tmp_path):
     written(tmp_path / "11.npy", obj_scale=0.08)
     with pytest.raises(InputError, match="2 objects or sizes"):
         read_grasps(tmp_path)
+    written(tmp_path / "11.npy", surehold={"friction": 0.7})
+    with pytest.raises(InputError, match="made with different options"):
+        read_grasps(tmp_path)
+    assert read_grasps(tmp_path / "11.npy").settings == {"friction": 0.7}
     with pytest.raises(InputError, match=r"holds 0 \.npy files"):
         read_grasps((tmp_path / "empty").mkdir() or tmp_path / "empty")
 

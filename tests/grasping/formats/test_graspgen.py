@@ -21,10 +21,11 @@ def some(n=4):
 
 
 def test_a_file_comes_back(tmp_path):
-    told = GraspFile("mug", "", some(), "mug.obj", 0.25)
+    told = GraspFile("mug", "", some(), "mug.obj", 0.25, settings={"contact": "single", "friction": 0.7})
     write_graspgen_file(tmp_path / "g.json", told)
     back = read_grasps(tmp_path / "g.json")
     assert (back.object_frame, back.object_file, back.object_scale) == ("mug", "mug.obj", 0.25)
+    assert back.settings == told.settings
     for a, b in zip(told.grasps, back.grasps, strict=True):
         assert (a.name, a.confidence) == (b.name, b.confidence)
         assert a.position == pytest.approx(b.position, abs=1e-15)
@@ -67,6 +68,7 @@ def test_the_file_of_another_generator_is_read(tmp_path):
         (json.dumps(GOOD).replace("1.0, 0.0, 0.0, 0.0", '"1", 0.0, 0.0, 0.0'), "must be a number"),
         (json.dumps(GOOD).replace('"scale": 1.0', '"scale": -1.0'), "object_scale is -1"),
         (json.dumps(GOOD).replace('"a.obj"', "7"), "object.file must be a text"),
+        (json.dumps(GOOD | {"surehold": [1]}), "surehold must be a mapping of options, not a list of 1"),
     ],
 )
 def test_bad_files_are_refused_in_one_line(tmp_path, text, words):

@@ -199,7 +199,7 @@ def test_the_file_of_another_generator_is_read(tmp_path):
         ("object_scale: x\n", "object_scale must be a number"),
         ("object_file: [1]\n", "object_file must be a text"),
         ("finger_colliders: a\n", "finger_colliders must be a list"),
-        ("surehold: 1\n", "surehold a mapping"),
+        ("surehold: 1\n", "surehold must be a mapping"),
     ],
 )
 def test_what_is_said_beside_the_grasps_is_checked(tmp_path, text, words):

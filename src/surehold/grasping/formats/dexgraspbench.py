@@ -8,7 +8,7 @@
     squeeze_qpos        the same, targets of the squeeze
 
 What surehold writes has the object's frame as the world and holds `joint_names`, `confidence`, `quality` and `posture`
-beside, which the benchmark ignores.
+beside, and `surehold` with the options that the hand was closed with, which the benchmark ignores.
 
 NumPy stores a dictionary as a pickle, and a pickle can run anything when it is loaded. Here only those are loaded that
 consist of the few operations that numbers, texts, lists, dictionaries and arrays of numbers need, and the places of
@@ -32,9 +32,10 @@ from surehold.grasping.formats.stored import (
     checked_grasp,
     number,
     numbers,
+    options_of,
     unit_quaternion,
 )
-from surehold.grasping.plain_data import regular_bytes
+from surehold.grasping.plain_data import grasp_to_dict, regular_bytes
 from surehold.grasping.poses import Pose
 
 __all__ = ["read_dexgraspbench_grasps", "write_dexgraspbench_files"]
@@ -65,6 +66,8 @@ def write_dexgraspbench_files(folder: str | Path, file: GraspFile, joints: Seque
         }
         if grasp.quality is not None:
             row["quality"] = grasp.quality
+        if checked.settings:
+            row["surehold"] = grasp_to_dict(checked.settings)
         squeeze = grasp.squeeze_joints or grasp.joints
         for part, values in zip(_PARTS, (grasp.pregrasp_joints, grasp.joints, squeeze), strict=True):
             for name in values:
@@ -95,9 +98,13 @@ def read_dexgraspbench_grasps(path: str | Path, joints: Sequence[str] = ()) -> G
     paths = {(row.get("obj_path"), number(row.get("obj_scale", 1.0), f"{str(f)!r}: obj_scale")) for f, row in rows}
     if len(paths) > 1:
         raise InputError(f"{str(path)!r} holds grasps of {len(paths)} objects or sizes; give a folder of one.")
+    settings = [options_of(row, repr(str(file))) for file, row in rows]
+    if any(one != settings[0] for one in settings):
+        raise InputError(f"{str(path)!r} holds grasps made with different options; give a folder of one run.")
     obj, scale = paths.pop()
     grasps = tuple(_grasp(file, row, joints) for file, row in rows)
-    return checked_file(GraspFile(Path(obj or "").name, "", grasps, object_file=obj or "", object_scale=scale))
+    name = Path(obj or "").name
+    return checked_file(GraspFile(name, "", grasps, object_file=obj or "", object_scale=scale, settings=settings[0]))
 
 
 def _grasp(file: Path, row: dict[str, Any], joints: Sequence[str]) -> StoredGrasp:

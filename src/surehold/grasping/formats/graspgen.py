@@ -4,7 +4,8 @@
 
 A transform is from the gripper's root frame to the object's frame [m]. GraspGen's gripper approaches along z and closes
 along x; a root frame that differs is said in its configuration of the gripper. Joints are not stored. `names`,
-`confidences` and `postures`, which its reader ignores, are written beside them and read where they are there.
+`confidences` and `postures`, and `surehold` with the options that the hand was closed with, which its reader ignores,
+are written beside them and read where they are there.
 """
 
 import json
@@ -14,8 +15,16 @@ from typing import Any
 import numpy as np
 
 from surehold.errors import InputError
-from surehold.grasping.formats.stored import GraspFile, StoredGrasp, checked_file, checked_grasp, number, numbers
-from surehold.grasping.plain_data import regular_bytes
+from surehold.grasping.formats.stored import (
+    GraspFile,
+    StoredGrasp,
+    checked_file,
+    checked_grasp,
+    number,
+    numbers,
+    options_of,
+)
+from surehold.grasping.plain_data import grasp_to_dict, regular_bytes
 from surehold.grasping.poses import Pose
 
 __all__ = ["graspgen_file", "read_graspgen_grasps", "write_graspgen_file"]
@@ -29,7 +38,7 @@ def write_graspgen_file(path: str | Path, file: GraspFile) -> None:
     from surehold.store.atomic import write_file
 
     checked = checked_file(file)
-    content = {
+    content: dict[str, Any] = {
         "object": {"file": checked.object_file, "scale": checked.object_scale},
         "grasps": {
             "transforms": [np.vstack([g.pose.matrix, [0.0, 0.0, 0.0, 1.0]]).tolist() for g in checked.grasps],
@@ -39,6 +48,8 @@ def write_graspgen_file(path: str | Path, file: GraspFile) -> None:
             "postures": [g.posture for g in checked.grasps],
         },
     }
+    if checked.settings:
+        content["surehold"] = grasp_to_dict(checked.settings)
     write_file(Path(path), json.dumps(content, allow_nan=False) + "\n")
 
 
@@ -93,5 +104,6 @@ def graspgen_file(where: str, content: Any) -> GraspFile:
             tuple(stored),
             object_file=file,
             object_scale=number(1.0 if scale is None else scale, f"{where!r}: object.scale"),
+            settings=options_of(content, repr(where)),
         )
     )

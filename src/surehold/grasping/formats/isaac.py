@@ -15,7 +15,7 @@ from typing import Any, Final
 import yaml
 
 from surehold.errors import InputError
-from surehold.grasping.formats.stored import GraspFile, StoredGrasp, checked_file, checked_grasp, number
+from surehold.grasping.formats.stored import GraspFile, StoredGrasp, checked_file, checked_grasp, number, options_of
 from surehold.grasping.plain_data import grasp_to_dict, plain_yaml
 
 __all__ = ["isaac_file", "read_isaac_grasps", "write_isaac_file", "write_isaac_grasps"]
@@ -101,9 +101,9 @@ def isaac_file(where: str, content: Any) -> GraspFile:
     frames = [
         str(content.get(f"{kind}_frame", content.get(f"{kind}_frame_link", ""))) for kind in ("object", "gripper")
     ]
-    colliders, settings = content.get("finger_colliders") or [], content.get("surehold") or {}
-    if not isinstance(colliders, list) or not isinstance(settings, dict):
-        raise InputError(f"{where!r}: finger_colliders must be a list and surehold a mapping; leave them out.")
+    colliders = content.get("finger_colliders") or []
+    if not isinstance(colliders, list):
+        raise InputError(f"{where!r}: finger_colliders must be a list of names; leave it out.")
     scale = content.get("object_scale", 1.0)
     return checked_file(
         GraspFile(
@@ -115,7 +115,7 @@ def isaac_file(where: str, content: Any) -> GraspFile:
             gripper_file=_text(content, "gripper_file", where),
             finger_colliders=tuple(str(name) for name in colliders),
             open_limit=_text(content, "open_limit", where),
-            settings={str(key): value for key, value in settings.items()},
+            settings=options_of(content, repr(where)),
         )
     )
 

@@ -13,7 +13,16 @@ import numpy as np
 from surehold.errors import InputError
 from surehold.grasping.poses import Pose
 
-__all__ = ["GraspFile", "StoredGrasp", "checked_file", "checked_grasp", "number", "numbers", "unit_quaternion"]
+__all__ = [
+    "GraspFile",
+    "StoredGrasp",
+    "checked_file",
+    "checked_grasp",
+    "number",
+    "numbers",
+    "options_of",
+    "unit_quaternion",
+]
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,14 @@ def checked_grasp(grasp: StoredGrasp, place: str) -> StoredGrasp:
         posture=_posture(grasp.posture, f"{place}: posture"),
         quality=None if grasp.quality is None else number(grasp.quality, f"{place}: quality"),
     )
+
+
+def options_of(content: Mapping[str, Any], place: str) -> dict[str, Any]:
+    """Return the options that a file's `surehold` holds, none where it has none; InputError that names the `place`."""
+    settings = content.get("surehold") or {}
+    if not isinstance(settings, dict):
+        raise InputError(f"{place}: surehold must be a mapping of options, not {_shown(settings)}; leave it out.")
+    return {str(name): value for name, value in settings.items()}
 
 
 def _posture(value: Any, place: str) -> float | tuple[float, ...]:

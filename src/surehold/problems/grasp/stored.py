@@ -6,7 +6,6 @@ from typing import Any, Final, NamedTuple
 
 from surehold.errors import InputError
 from surehold.grasping.formats.gripper import joint_order
-from surehold.grasping.formats.isaac import read_isaac_grasps
 from surehold.grasping.formats.named import format_of, read_grasps
 from surehold.grasping.formats.stored import GraspFile
 from surehold.grasping.hand.model import Hand
@@ -51,8 +50,8 @@ def described_file(path: str | Path, words: Mapping[str, Any]) -> DescribedFile:
         If the file, the hand or the object is refused or not named, or an option of the file does not exist.
     """
     given = {name: value for name, value in words.items() if value not in ("", None)}
-    file = read_isaac_grasps(path) if format_of(path) == "isaac" else None
-    said = dict(file.settings) if file else {}
+    file = read_grasps(path)
+    said = dict(file.settings)
     for name in said:
         if name not in _KEPT:
             raise InputError(f"{str(path)!r}: surehold.{name[:40]} is none of {', '.join(_KEPT)}; take it out.")
@@ -61,7 +60,7 @@ def described_file(path: str | Path, words: Mapping[str, Any]) -> DescribedFile:
     merged = checked_words({"object": ""} | said | given)
     _check_kinds(str(path), merged)
     hand = _hand(str(path), merged, "hand" in given)
-    if file is None:
+    if format_of(path) == "dexgraspbench" and not said:  # of another tool, which may not name the joints
         file = read_grasps(path, joint_order(hand))
     name = merged["object"]
     if name and (name in OBJECTS or Path(name).exists() or "object" in given):

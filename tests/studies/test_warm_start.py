@@ -1,0 +1,88 @@
+"""Former trials: each is taken once, failed ones are named, and a header that does not fit says what may be meant."""
+
+import json
+
+import pytest
+
+from surehold.cli import run
+from surehold.errors import InputError
+from surehold.studies.robot import RobotStudy
+from surehold.studies.search_space import SearchSpace
+from surehold.studies.settings import StudySettings
+from surehold.studies.warm_start import import_trials, trials_of_csv, trials_of_study
+
+SPACE = SearchSpace({"dx": (-0.05, 0.05)})
+NAMES = {"dx": "dx"}
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("SUREHOLD_STORAGE", raising=False)
+    return tmp_path
+
+
+def created(name):
+    return RobotStudy.create(name, StudySettings(SPACE), f"{name}.log")
+
+
+def test_a_trial_is_imported_once(here):
+    study = created("warm")
+    file = here / "rig.csv"
+    file.write_text("dx,value\n0.01,0.7\n0.01,0.7\n0.03,\n")
+    first = import_trials(study, trials_of_csv("rig.csv", NAMES))
+    assert (first.values, first.failed, first.already) == (2, ["line 4 has no value"], [])
+    again = import_trials(study, trials_of_csv("rig.csv", NAMES))
+    assert (again.values, again.failed, again.already) == (0, [], ["line 2", "line 3", "line 4"])
+    file.write_text("dx,value\n0.01,0.75\n0.01,0.7\n0.03,\n0.04,0.1\n")
+    more = import_trials(study, trials_of_csv("rig.csv", NAMES))
+    assert (more.values, more.already) == (2, ["line 3", "line 4"]), "a line that was changed, and one that was added"
+    other = created("other")
+    found = trials_of_study(study.study, NAMES, "maximize")
+    assert import_trials(other, found).failed == ["trial 2 failed"]
+    assert len(import_trials(other, found).already) == len(study.trials()) == len(other.trials()) == 5
+
+
+def test_what_was_imported_is_said(here, capsys):
+    created("warm").close()
+    (here / "rig.csv").write_text("dx,value,state\n0.01,0.7,\n0.02,0.3,failed\n0.03,,\n")
+    line = ["study", "import", "warm", "rig.csv", "--storage", "warm.log"]
+    assert run(line) == 0
+    said = "3 trials imported into warm: 1 with a value, 2 failed: line 3 has state failed, line 4 has no value\n"
+    assert capsys.readouterr().out == said
+    assert run(line) == 0
+    said = "0 trials imported into warm\nimported before and not again: 3 (line 2, line 3, line 4)\n"
+    assert capsys.readouterr().out == said
+    assert run([*line, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["imported"], answer["already"]) == (0, ["line 2", "line 3", "line 4"])
+
+
+def test_many_lines_are_cut_short(here, capsys):
+    created("warm").close()
+    (here / "rig.csv").write_text("dx,value\n" + "0.01,\n" * 12)
+    assert run(["study", "import", "warm", "rig.csv", "--storage", "warm.log"]) == 0
+    assert "line 11 has no value, and 2 more (--json names all)" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("dx;value\n0,01;0,7\n", r"by semicolons \('dx;value'\); save it as CSV with commas"),
+        ("dx\tvalue\n0.01\t0.7\n", "by tabs"),
+        ("DX,value\n0.01,0.7\n", r"no column 'dx'; it has DX, value\. Is it 'DX'\? Then give --columns dx=DX\.$"),
+        ("dx [m],value\n0.01,0.7\n", r'Then give --columns "dx=dx \[m\]"\.$'),
+        ("dx,Value\n0.01,0.7\n", r"Then give --value Value\.$"),
+        ("u,value\n0.01,0.7\n", r"no column 'dx'; it has u, value\.$"),
+    ],
+)
+def test_a_header_that_does_not_fit(here, text, words):
+    (here / "rig.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        trials_of_csv("rig.csv", NAMES)
+
+
+def test_a_trial_that_does_not_fit_names_the_option_that_leaves_it_out(here):
+    (here / "rig.csv").write_text("dx,value\n0.5,0.7\n")
+    with pytest.raises(InputError, match=r"line 2: .*Nothing was imported; .* with --skip-bad\."):
+        import_trials(created("warm"), trials_of_csv("rig.csv", NAMES))
