@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from optuna import logging
 from optuna.trial import TrialState
 
 import surehold as sh
@@ -165,3 +166,15 @@ def test_files_of_a_problem_are_found_from_another_folder(tmp_path, monkeypatch)
     assert problem.simulator.object.name == "part"
     monkeypatch.chdir(tmp_path / "here")  # the same study, told the same again
     RobotStudy.create("f", StudySettings(SPACE, problem={"function": "rig.py:score"}), storage, resume=True)
+
+
+def test_a_worker_says_for_what_it_waits(study, caplog):
+    logging.enable_propagation()
+    try:
+        study.set_stop_rule(StopRule(trials=1))
+        asked = study.ask("silent", lifetime=2.5)
+        assert work(study, attempt(lambda x: x[0])) == 1
+    finally:
+        logging.disable_propagation()
+    assert [trial.number for trial in study.trials() if trial.state.is_finished()] == [asked.id]
+    assert sum("Waiting for the last trials of other workers" in message for message in caplog.messages) == 1

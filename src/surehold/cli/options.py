@@ -106,7 +106,7 @@ First = Annotated[
 Noise = Annotated[
     str | None,
     typer.Option(
-        help="Input noise: a share of every range (0.03), or NAME=DEVIATION,... in the variables' units, or none."
+        help="Input noise: a share of every range (0.03), or NAME=DEVIATION,... in the variables' units; none with bo."
     ),
 ]
 

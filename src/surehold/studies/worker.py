@@ -89,15 +89,23 @@ def work(
     name = name or worker_name()
     if not lifetime > 0.0:
         raise InputError(f"lifetime is {lifetime!r}; give a positive number of seconds.")
-    made = 0
+    made, waiting = 0, False
     while most is None or made < most:
         try:
             asked = _patiently(lambda: study.ask(name, lifetime=lifetime), "no trial could be asked for")
         except NothingToAsk as nothing:
-            if not nothing.paused and not _mortal(study):
+            seconds = _until_handed_out(study)
+            if not nothing.paused and seconds is None:
                 break
+            if not waiting and not nothing.paused and seconds is not None and seconds > _POLL:
+                _log.warning(
+                    f"Waiting for the last trials of other workers; those of one that is silent are handed out again in "
+                    f"{seconds:.0f} s. Ctrl-C leaves them."
+                )
+            waiting = True
             time.sleep(_POLL)
             continue
+        waiting = False
         before(asked)
         with _alive(study, asked.id, name, lifetime):
             outcome = attempt(asked.parameters)
@@ -133,10 +141,11 @@ def _tell(study: RobotStudy, id: int, outcome: Outcome) -> Outcome:
     return outcome
 
 
-def _mortal(study: RobotStudy) -> bool:
-    """Tell whether a trial is under way whose worker may die."""
-    running = [t for t in study.trials() if t.state == TrialState.RUNNING]
-    return any((holder := holder_of(t)) is not None and holder.until is not None for t in running)
+def _until_handed_out(study: RobotStudy) -> float | None:
+    """Return the seconds until the first trial under way is handed out again, None where none will be."""
+    holders = [holder_of(trial) for trial in study.trials() if trial.state == TrialState.RUNNING]
+    ends = [holder.until for holder in holders if holder is not None and holder.until is not None]
+    return max(min(ends) - time.time(), 0.0) if ends else None
 
 
 def _patiently(call: Callable[[], Any], otherwise: str) -> Any:
