@@ -12,6 +12,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.maximization import Result
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.recommendation import outliers_in_words
+from surehold.optimization.variables import Number
 from surehold.problems.perturbation import RobustScore
 from surehold.reports.run_report import (
     Candidate,
@@ -154,8 +155,9 @@ def report_of(
             )
     shown = [i for i, name in enumerate(box.names) if name not in hidden]
     held = np.zeros(box.dimension, dtype=bool) if box.uncontrolled is None else box.uncontrolled.held
+    whole = {variable.name for variable in box.variables if isinstance(variable, Number) and variable.integer}
     variables = tuple(
-        Variable(name, float(lower), float(upper), (units or {}).get(name, ""), bool(drawn))
+        Variable(name, float(lower), float(upper), (units or {}).get(name, ""), bool(drawn), name in whole)
         for name, lower, upper, drawn in zip(box.names, box.lower, box.upper, held, strict=True)
         if name not in hidden
     )

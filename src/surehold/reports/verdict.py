@@ -51,7 +51,9 @@ def _said(report: RunReport) -> Callable[[float | None], str]:
 
 def coordinate(variable: Variable, value: float, digits: int = 3) -> str:
     """Return a value of a variable as people write it, without its unit."""
-    plain = math.exp(value) if variable.log else float(value) * variable.factor
+    plain = float(variable.shown(np.float64(value)))  # type: ignore[arg-type]
+    if variable.whole and abs(plain - round(plain)) < 1e-6 * max(abs(plain), 1.0) < 1e9:
+        return f"{round(plain)}".replace("-", "−")
     return number(plain, digits + variable.more_digits)
 
 
@@ -59,7 +61,7 @@ def coordinates(report: RunReport, candidate: Candidate) -> str:
     """Return where a candidate is, as `dx = 3.1 mm, rx = 12°`."""
     parts = []
     for variable, value in zip(report.variables, candidate.x, strict=True):
-        unit = variable.table_unit
+        unit = variable.shown_unit
         space = "" if unit in ("", "°") else " "
         parts.append(f"{variable.name} = {coordinate(variable, value)}{space}{unit}{' (drawn)' * variable.drawn}")
     if candidate.trial is not None:
