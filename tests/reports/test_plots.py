@@ -132,6 +132,17 @@ def test_whole_numbers_are_printed_as_such(mixed):
     assert "ln force ± 0.1" in render(report)
 
 
+def test_a_run_without_a_success_recommends_nothing(tmp_path):
+    box, noise = sh.Box({"x": (0.0, 1.0)}), sh.InputNoise.unit(0.03)
+    run = sh.maximize(lambda x: False, box, 8, input_noise=noise, outcome="success", seed=0)
+    told = verdict(result_report(run))
+    assert told.headline == "None of 8 trials succeeded."
+    assert "The point shown is no answer. Give more trials" in told.text
+    page = run.report(tmp_path / "none").read_text(encoding="utf-8")
+    assert '<p class="headline">None of 8 trials succeeded.' in page
+    assert "expected to succeed in" not in page
+
+
 def test_a_trial_that_met_a_good_condition_is_refused():
     def grip(x):
         return float(x[1] - 3.0 * (x[0] - x[1]) ** 2)

@@ -77,7 +77,7 @@ def run_session(
     describe: Callable[[Candidate], Candidate] = lambda candidate: candidate,
     also_write: Callable[[RunReport, Path], None] = lambda report, folder: None,
     units: Mapping[str, str] | None = None,
-    quality_name: str = "value",
+    quality_name: str = "",
     disturbance: str = "the input is off",
     tolerate_failures: bool = False,
     direction: str = "maximize",
