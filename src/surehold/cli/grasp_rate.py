@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
+from surehold.amounts import amount
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.options import Seed
 
@@ -97,7 +98,7 @@ def _grasp_rate(
         worth = one.grasp.quality if one.robust is None else one.robust.mean
         stored.append(stored_grasp(hand, one.grasp, preshape, one.stored.name, worth))
     console.print(
-        f"{file}: {len(rated)} grasps of hand {hand.name} on {body.name}, {simulator.quality} with "
+        f"{file}: {amount(len(rated), 'grasp')} of hand {hand.name} on {body.name}, {simulator.quality} with "
         f"{simulator.contact} contacts and friction {simulator.friction:g}{squeeze}.",
         markup=False,
         soft_wrap=True,

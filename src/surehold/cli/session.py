@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from surehold.amounts import amount
 from surehold.cli.compilation import announced, warm_up
 from surehold.cli.folders import folder_of
 from surehold.cli.interruption import terminable, undisturbed
@@ -133,7 +134,7 @@ def run_session(
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
         console.print(
-            f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), seed {seed}; "
+            f"[bold]{_plain(title)}[/bold]: {amount(trials, 'trial')} ({initial} initial), seed {seed}; "
             f"method {method} {METHODS[method]}"
         )
         with announced(console):
@@ -148,7 +149,7 @@ def run_session(
         else:
             result = _as_study(kept, problem, trials, options, units or {}, console)
         if result.interrupted:
-            console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
+            console.print(f"Interrupted after {len(result.y)} of {amount(trials, 'trial')}; keeping what was done.")
         notes = _failures(result)
         scores: dict[tuple[str, int], RobustScore | None] = {}
         for label, index in gather.answers(result).items():
@@ -291,7 +292,7 @@ def _progress(
             progress.update(task, completed=done, description=phase, best=number(best), robust=robust)
             if not console.is_terminal and done % 10 == 0:
                 best_so_far = "" if counted else f"{extreme} {number(best)} "
-                console.print(f"{done} of {trials} trials: {best_so_far}{robust}".rstrip())
+                console.print(f"{done} of {amount(trials, 'trial')}: {best_so_far}{robust}".rstrip())
 
         yield show
 
@@ -301,7 +302,9 @@ def _failures(result: Result) -> list[str]:
     if not failed:
         return []
     first = failed[0]
-    return [f"{len(failed)} of {len(result.y)} trials failed; the first, trial {first.index}: {first.failure}"]
+    return [
+        f"{len(failed)} of {amount(len(result.y), 'trial')} failed; the first, trial {first.index}: {first.failure}"
+    ]
 
 
 def _show(report: RunReport, path: Path, seconds: float, console: Console) -> None:
@@ -323,7 +326,9 @@ def _show(report: RunReport, path: Path, seconds: float, console: Console) -> No
         console.print(f"Note: {_plain(note)}")
     failed = int(np.sum(report.failed))
     rest = f", {failed} failed" if failed else ""
-    console.print(f"{report.y.size} trials{rest} in {seconds:.1f} s. Report: {_plain(str(path))}", soft_wrap=True)
+    console.print(
+        f"{amount(report.y.size, 'trial')}{rest} in {seconds:.1f} s. Report: {_plain(str(path))}", soft_wrap=True
+    )
 
 
 def _any_above(result: Result, limit: float | None) -> bool:

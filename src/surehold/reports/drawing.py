@@ -17,6 +17,7 @@ __all__ = ["PALETTE", "draw_line", "draw_map", "draw_shake", "draw_trace", "mark
 
 #: Okabe and Ito's vermilion and blue (told apart by color-blind readers), darkened for contrast on white.
 PALETTE: Final = {"ink": "#1b1f25", "muted": "#68707b", "grid": "#d8dce2", "high": "#c24e00", "answer": "#0a65b3"}
+_SHARES: Final = (-0.05, 1.05)  # limits of an axis of shares, with room for marks at 0 and 1
 _ROUND: Final = 121  # points of an ellipse
 _MARKERS: Final = {"high": "^", "answer": "o"}
 _STYLE: Final = {
@@ -83,12 +84,14 @@ def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
     margin = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
     color = PALETTE[_role(report, candidate)]
     edges = np.linspace(low - margin, high + margin, 28)
+    if report.counted:
+        edges = np.linspace(*_SHARES, 12)  # a bin around 0 and one around 1
     tallest = max(np.histogram(c.values, edges)[0].max() for c in report.candidates)
     counts, _ = np.histogram(candidate.values, edges)
     axes.bar(edges[:-1], counts, np.diff(edges), align="edge", color=color, alpha=0.75, linewidth=0)
     axes.axvline(candidate.quality, color=PALETTE["ink"], linestyle=(0, (4, 2)), linewidth=1.2)
     axes.plot(candidate.mean, 0, marker="D", color=color, markeredgecolor=PALETTE["ink"], clip_on=False, zorder=5)
-    right = candidate.quality > 0.6 * high + 0.4 * low
+    right = candidate.quality > 0.6 * edges[-1] + 0.4 * edges[0]
     axes.annotate(
         "hit exactly",
         (candidate.quality, 1.0),
@@ -101,7 +104,7 @@ def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
     )
     axes.set_xlim(edges[0], edges[-1])
     axes.set_ylim(0.0, 1.18 * tallest)
-    axes.set_xlabel(f"{report.quality_name} (◆ mean {worth(report, candidate.mean)})")
+    axes.set_xlabel(f"{report.axis_name} (◆ mean {worth(report, candidate.mean)})")
     axes.set_ylabel("re-queries")
     axes.xaxis.set_major_locator(MaxNLocator(nbins=5))  # more would overlap where numbers are long
     axes.yaxis.set_major_locator(MaxNLocator(nbins=3, integer=True))
@@ -154,7 +157,7 @@ def draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> No
     axes.set_title("Unscented mean (over the input noise)" if robust else "Model mean (input hit exactly)")
     bar = axes.figure.colorbar(image, ax=axes, fraction=0.05, pad=0.02, aspect=25)
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
-    bar.set_label(report.quality_name)
+    bar.set_label(report.axis_name)
 
 
 def _draw_candidate(axes: "Axes", report: RunReport, candidate: Candidate, pair: tuple[int, int]) -> None:
@@ -218,8 +221,8 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
     everything = np.concatenate([view.mean, report.y[ok]])
     margin = 0.25 * (everything.max() - everything.min()) or 1.0
     set_scale(axes, "x", (t[0], t[-1]), log=variable.log, whole=variable.whole)
-    axes.set(xlabel=variable.label, ylabel=report.quality_name)
-    axes.set_ylim(everything.min() - margin, everything.max() + margin)
+    axes.set(xlabel=variable.label, ylabel=report.axis_name)
+    axes.set_ylim(_SHARES if report.counted else (everything.min() - margin, everything.max() + margin))
     _legend_above(axes)
     axes.set_title("Model and trials")
 
@@ -267,7 +270,10 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             color=PALETTE["muted"],
         )
     axes.margins(y=0.12)
-    axes.set(xlabel="trial, from 0", ylabel=report.quality_name, xlim=(-0.5, max(report.y.size - 0.5, 0.6)))
+    if report.counted:
+        axes.set_ylim(_SHARES)
+    set_scale(axes, "x", (-0.5, report.y.size - 0.5), whole=True)
+    axes.set(xlabel="trial, from 0", ylabel=report.axis_name)
     axes.grid(axis="y", linewidth=0.6)
     axes.set_axisbelow(True)
     _legend_above(axes)

@@ -42,7 +42,7 @@ def _progress(report: RunReport) -> dict[str, Any]:
                 number[known], report.robust_trace[known], "recommended, expected under the noise", _ANSWER, shape="hv"
             )
         )
-    return _plot(f"{report.extreme.capitalize()} observed and robust value", data, "trial", report.quality_name)
+    return _plot(f"{report.extreme.capitalize()} observed and robust value", data, "trial", report.axis_name)
 
 
 def _line(report: RunReport, surface: Surface) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def _line(report: RunReport, surface: Surface) -> dict[str, Any]:
     for x, y, name, color in _candidates(report):
         spot = variable.shown(x[surface.variables[0] : surface.variables[0] + 1])
         data.append(_points(spot, y, name, _mark(color)))
-    return _plot("Model" + _aside(surface), data, variable.label, report.quality_name, log=(variable.log, False))
+    return _plot("Model" + _aside(surface), data, variable.label, report.axis_name, log=(variable.log, False))
 
 
 def _map(report: RunReport, surface: Surface, values: NDArray[np.floating], title: str) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def _map(report: RunReport, surface: Surface, values: NDArray[np.floating], titl
             "y": _numbers(up),
             "z": [_numbers(row) for row in values.T],
             "colorscale": "Viridis",
-            "colorbar": {"title": {"text": report.quality_name}},
+            "colorbar": {"title": {"text": report.axis_name}},
         }
     ]
     a, b = surface.variables

@@ -244,6 +244,11 @@ class RunReport:
         return self.recommended.noise
 
     @property
+    def axis_name(self) -> str:
+        """What values are called on an axis, where those of trials that succeed or fail are shares."""
+        return "share of executions that succeed" if self.counted else self.quality_name
+
+    @property
     def succeeded(self) -> bool:
         """Whether any trial succeeded."""
         told = self.y[~self.failed]

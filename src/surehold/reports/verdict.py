@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from surehold.amounts import amount
 from surehold.reports.run_report import Candidate, RunReport, Variable
 
 _NOTABLE: Final = 0.1  # share of the range of the values met from which on bad cases count as different
@@ -87,7 +88,7 @@ def _of_the_run(report: RunReport) -> Verdict:
         return _of_successes(report)
     if told.size > 1 and told.max() == told.min():
         return Verdict(
-            f"All {told.size} trials gave the same {name}, {said(float(told[0]))}: nothing was found.",
+            f"All {amount(told.size, 'trial')} gave the same {name}, {said(float(told[0]))}: nothing was found.",
             "There is no better or worse to learn from yet, so the point shown is only the first. Run more trials, or "
             "narrow the search to where outcomes differ.",
             False,
@@ -180,7 +181,7 @@ def _of_nothing(report: RunReport) -> Verdict:
     ended = "; ".join(f"{n} × {status}" for status, n in counts)
     met = f": no {report.quality_name} above {number(report.success_above)} was met" * (not report.counted)
     return Verdict(
-        f"None of {report.y.size} trials succeeded{met}.",
+        f"None of {amount(report.y.size, 'trial')} succeeded{met}.",
         f"{f'How they ended: {ended}. ' if ended else ''}The point shown is no answer. {report.advice}".strip(),
         False,
     )
@@ -195,9 +196,9 @@ def _of_successes(report: RunReport) -> Verdict:
         again = f"; of {answer.values.size} tried again when {report.disturbance}, {percent(answer.mean)} succeeded"
     sure = " ".join(f"The model is {value} {name}." for name, value in answer.details.items() if name[:5] == "sure ")
     share = percent(float(told.mean()))
-    made = f"{share} of the {told.size} trials succeeded"
+    made = f"{share} of the {amount(told.size, 'trial')} succeeded"
     if np.any((told > 0.0) & (told < 1.0)):
-        made = f"The {told.size} trials succeeded in {share} of their executions on average"
+        made = f"The {amount(told.size, 'trial')} succeeded in {share} of their executions on average"
     return Verdict(
         f"The recommended point is {expected}{again}.",
         f"It is {coordinates(report, answer)} ({_trial(answer)}). {made}, those made to learn included. {sure}".strip(),
