@@ -20,6 +20,9 @@ def slips(x):
         raise RuntimeError("slipped")
     return float(x[0])
 
+def raises(x):
+    raise ValueError("the rig is off")
+
 def nothing(x):
     return float("nan")
 """
@@ -118,7 +121,9 @@ def test_failed_trials_are_counted_and_failed_runs_are_recorded(tmp_path):
         assert row["best"][-1][1] <= 0.6
     row = run_once(cell_of(replace(problem, function=f"{tmp_path}/own.py:nothing")), 0)
     assert row["status"] == "failed"
-    assert "all 10 trials failed" in row["error"]
+    assert "all 10 trials failed; the first: " in row["error"]
+    row = run_once(cell_of(replace(problem, function=f"{tmp_path}/own.py:raises")), 0)
+    assert row["error"] == "ValueError: all 10 trials failed; the first: ValueError: the rig is off"
     row = run_once(cell_of(replace(problem, function=f"{tmp_path}/own.py:gone")), 0)
     assert row["status"] == "failed"
     assert "InputError" in row["error"]

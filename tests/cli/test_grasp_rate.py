@@ -179,4 +179,6 @@ def test_what_was_rated_before_an_interruption_is_said(block, capsys, monkeypatc
         return grasp(self, pose, s1)
 
     monkeypatch.setattr(Simulator, "grasp", interrupted)
-    assert "Interrupted: 1 of 2 grasps are rated." in rated("held/grasps.yaml", capsys)
+    said = rated("held/grasps.yaml", capsys)
+    assert "Interrupted: 1 of 2 grasps are rated." in said
+    assert "held/grasps.yaml: 1 grasp of hand" in said

@@ -197,7 +197,10 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("ask gone", "does not exist"),
+        ("ask gone", "does not exist in this folder \\('/"),
+        ("tell mug abc 1", "Invalid value for 'id': 'abc' is no whole number. See surehold study tell --help."),
+        ("status --jsn", "See surehold study status --help."),
+        ("create a --parameters dx=a", "'a' is neither a range nor a choice"),
         ("ask ../mug", "study name"),
         ("ask cup --storage runs/mug", "there are mug"),
         ("create mug --parameters dx=0:1", "exists in"),
@@ -226,7 +229,6 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("tell mug 0 good", "finite"),
         ("tell mug 0 1 --failed", "leave one of the two out"),
         ("tell mug 1 1", "trial 1 is not in study 'mug'; the last one is 0"),
-        ("tell mug zero 1", "valid integer"),
         ("tell mug -1 1", "0 or more"),
         ("tell mug 0 1 --reachd dx=0", "reachd"),
         ("tell mug 0 1 --reached dx=1e300", "can be reached"),

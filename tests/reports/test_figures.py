@@ -136,3 +136,38 @@ def test_the_name_of_the_initial_design_lies_in_the_figure(rkhs_report, share):
     box, frame = name.get_window_extent(), axes.get_window_extent()
     assert frame.x0 <= box.x0
     assert box.x1 <= frame.x1
+
+
+def test_a_single_trial_is_number_0(rkhs_report):
+    one = replace(
+        rkhs_report,
+        X=rkhs_report.X[:1],
+        y=rkhs_report.y[:1],
+        best_trace=rkhs_report.y[:1],
+        robust_trace=None,
+        candidates=(replace(rkhs_report.recommended, trial=0, values=np.array([1.0])),),
+    )
+    axes = figures.trace(one).axes[0]
+    assert [tick for tick in axes.get_xticks() if -0.5 <= tick <= 0.5] == [0.0]
+    assert {float(tick) % 1.0 for tick in axes.get_xticks()} == {0.0}
+    page = render(one)
+    assert "<b>1</b> trial (1 initial)" in page
+    assert "<summary>The only trial</summary>" in page
+
+
+@pytest.mark.parametrize("values", [np.ones(100), np.zeros(100), np.arange(100) % 2.0])
+def test_shares_are_drawn_from_0_to_1(rkhs_report, values):
+    counted = replace(
+        rkhs_report,
+        y=np.round(np.clip(rkhs_report.y, 0.0, 1.0)),
+        counted=True,
+        candidates=(replace(rkhs_report.recommended, quality=1.0, values=values),),
+    )
+    drawn = figures.figures(counted)
+    histogram, line, trace = (drawn[name].axes[0] for name in ("shake_recommended", "surface", "trace"))
+    shares = pytest.approx((-0.05, 1.05))
+    assert (histogram.get_xlim(), line.get_ylim(), trace.get_ylim()) == (shares, shares, shares)
+    assert histogram.get_xlabel().startswith("share of executions that succeed (")
+    assert line.get_ylabel() == trace.get_ylabel() == "share of executions that succeed"
+    told = {round(bar.get_x() + bar.get_width() / 2, 9): bar.get_height() for bar in histogram.patches}
+    assert (told[0.0], told[1.0]) == (np.sum(values == 0.0), np.sum(values == 1.0))

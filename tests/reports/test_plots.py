@@ -7,8 +7,10 @@ import pytest
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.reports.figures import figures
+from surehold.reports.page import render, table_rows
 from surehold.reports.plots import result_report
-from surehold.reports.verdict import verdict
+from surehold.reports.verdict import coordinates, verdict
 
 BOX = sh.Box({"force": (0.1, 10.0, "log"), "grip": ["pinch", "power"]})
 
@@ -79,7 +81,66 @@ def test_boxes_of_many_kinds_are_drawn(tmp_path):
     assert force.get_xscale() == "log"
     assert force.get_xlim() == pytest.approx((0.1, 10.0))
     assert [text.get_text() for text in grip.get_xticklabels()] == ["pinch", "power"]
-    assert "force [log]" in mixed.report(tmp_path / "mixed").read_text(encoding="utf-8")
+    assert "force [log]" not in mixed.report(tmp_path / "mixed").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def mixed():
+    def f(p):
+        return np.exp(-(np.log(p["force"] / 1.7) ** 2)) * (1.0 - 0.4 * abs(p["fingers"] - 3))
+
+    box = sh.Box({"force": (0.1, 10.0, "log"), "fingers": (2, 5, "int")})
+    return sh.maximize(f, box, 14, input_noise=sh.InputNoise({"force": 0.1, "fingers": 0}), seed=0)
+
+
+def test_a_map_is_in_the_units_of_its_variables(mixed):
+    report = result_report(mixed)
+    figure = figures(report)["surface_mean"]
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    assert axes.get_xscale() == "log"
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("force", "fingers")
+    assert axes.get_xlim() == pytest.approx((0.1, 10.0), rel=0.1)
+    assert {text.get_text() for text in axes.get_xticklabels()} >= {"0.1", "1", "10"}
+    assert {float(tick) % 1.0 for tick in axes.get_yticks()} == {0.0}
+    marks = axes.lines[-1].get_xydata()
+    assert marks[0] == pytest.approx([np.exp(report.recommended.x[0]), report.recommended.x[1]])
+    ellipse = np.log(axes.lines[-2].get_xdata()) - report.recommended.x[0]
+    assert ellipse.max() == pytest.approx(0.2, rel=1e-3), "two standard deviations of the logarithm"
+    left, right = axes.images[0].get_window_extent().intervalx
+    assert (left, right) == pytest.approx(tuple(axes.get_window_extent().intervalx)), "the picture fills the axes"
+
+
+def test_a_close_view_of_a_whole_number_is_no_narrower_than_a_step(mixed):
+    report = result_report(mixed)
+    close = report.surfaces[1]
+    level = round(float(report.recommended.x[1]))
+    assert close.axes[1][0] == pytest.approx(level - 1.0)
+    assert close.axes[1][-1] == pytest.approx(level + 1.0)
+    assert close.axes[0][-1] - close.axes[0][0] < np.log(100.0) / 2
+    axes = figures(report)["surface_mean_close"].axes[0]
+    shown = [tick for tick in axes.get_xticks() if axes.get_xlim()[0] <= tick <= axes.get_xlim()[1]]
+    assert len(shown) >= 2, "less than a decade has numbers, too"
+    assert {float(tick) % 1.0 for tick in axes.get_yticks()} == {0.0}
+
+
+def test_whole_numbers_are_printed_as_such(mixed):
+    report = result_report(mixed)
+    level = str(round(float(report.recommended.x[1])))
+    assert dict(table_rows(report))["fingers"][-1] == level
+    assert coordinates(report, report.recommended).endswith(f"fingers = {level}")
+    assert "ln force ± 0.1" in render(report)
+
+
+def test_a_run_without_a_success_recommends_nothing(tmp_path):
+    box, noise = sh.Box({"x": (0.0, 1.0)}), sh.InputNoise.unit(0.03)
+    run = sh.maximize(lambda x: False, box, 8, input_noise=noise, outcome="success", seed=0)
+    told = verdict(result_report(run))
+    assert told.headline == "None of 8 trials succeeded."
+    assert "The point shown is no answer. Give more trials" in told.text
+    page = run.report(tmp_path / "none").read_text(encoding="utf-8")
+    assert '<p class="headline">None of 8 trials succeeded.' in page
+    assert "expected to succeed in" not in page
 
 
 def test_a_trial_that_met_a_good_condition_is_refused():

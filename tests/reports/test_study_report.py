@@ -90,7 +90,7 @@ def test_all_kinds_of_parameters_are_drawn(tmp_path):
         asked = study.ask()
         study.tell(asked.id, asked.parameters["n"] - asked.parameters["f"])
     report = study_report(study)
-    assert [v.label for v in report.variables] == ["f [log N]", "n"]
+    assert [v.label for v in report.variables] == ["f [N]", "n"]
     answer = study.recommend().parameters
     rows = dict(table_rows(report))
     assert float(rows["f [N]"][0]) == pytest.approx(answer["f"], rel=1e-3), "the value, not its logarithm"
@@ -99,7 +99,11 @@ def test_all_kinds_of_parameters_are_drawn(tmp_path):
     assert f", c = {taken[report.recommended.trial]}" in render(report)
     assert report.surfaces[0].variables == (0, 1)
     assert report.surfaces[0].note == "slice through the recommended point over f and n"
-    assert len(interactive_plots(report)) == 2
+    plots = interactive_plots(report)
+    assert len(plots) == 2
+    drawn = json.loads(plots["surehold-2-model"])
+    assert drawn["layout"]["xaxis"]["type"] == "log"
+    assert drawn["data"][-1]["x"] == pytest.approx([answer["f"]], rel=1e-4)
 
 
 def test_choices_alone_have_a_page_without_maps(tmp_path):

@@ -30,8 +30,8 @@ def test_the_default_is_a_journal_of_the_run(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("url", "message"),
     [
-        ("gone/journal.log", "does not exist"),
-        ("sqlite:///gone.db", "does not exist"),
+        ("gone/journal.log", "does not exist in this folder .*'/.*/gone/journal.log' was looked for"),
+        ("sqlite:///gone.db", "does not exist in this folder .*'/.*/gone.db' was looked for"),
         ("sqlite://", "names no file"),
         ("mysql://host/db", "of no kind that is known"),
         ("postgresql://nobody@127.0.0.1:1/none", "cannot be used"),

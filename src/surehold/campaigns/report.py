@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from surehold.amounts import amount
 from surehold.campaigns.comparison import claim_results
 from surehold.campaigns.costs import cost_table, total_cost_table
 from surehold.campaigns.illustrations import grasp_scenes, illustrations
@@ -100,7 +101,7 @@ def campaign_report(campaigns: dict[str, Records], *, illustrated: bool = True) 
         (str(len(campaigns)), "campaign" if len(campaigns) == 1 else "campaigns"),
     ]
     if failed:
-        facts.append((str(failed), "failed runs"))
+        facts.append((str(failed), "failed run" if failed == 1 else "failed runs"))
     notes = [note for records in campaigns.values() for note in records.notes]
     sources = {row["versions"]["source"] for records in campaigns.values() for row in records.done.values()}
     if len(sources) > 1:
@@ -114,7 +115,7 @@ def _headline(campaigns: dict[str, Records]) -> str:
     told = [r for r in claim_results(campaigns) if r.verdict not in ("no runs", "too few runs")]
     if not told:
         runs = sum(len(records.done) for records in campaigns.values())
-        return f"{len(campaigns)} campaigns, {runs:,} runs."
+        return f"{amount(len(campaigns), 'campaign')}, {amount(runs, 'run')}."
     count = {word: sum(result.verdict == word for result in told) for word in ("holds", "not shown", "contradicted")}
     return (
         f"Of {len(told)} tests of the thesis' claims {count['holds']} hold, {count['not shown']} are not shown and "

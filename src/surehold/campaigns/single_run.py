@@ -66,6 +66,7 @@ class _Run:
         self.asked = robust_problem_of(cell.on)
         self.X: list[NDArray[np.float64]] = []
         self.told: list[float] = []
+        self.failure = ""  # of the first trial that raised
         self.true: list[float] = []
         self.answers: list[NDArray[np.float64] | None] = []
         self.leaves: list[float] = []
@@ -87,8 +88,9 @@ class _Run:
     def _try(self, u: NDArray[np.float64]) -> None:
         try:
             told, true = self.observe(u)
-        except Exception:  # a trial that gives nothing is the trial's outcome, not the run's end
+        except Exception as error:  # a trial that gives nothing is the trial's outcome, not the run's end
             told = true = np.nan
+            self.failure = self.failure or f"{type(error).__name__}: {error}"
         self.X.append(u)
         self.told.append(told if np.isfinite(told) else np.nan)
         self.true.append(true if np.isfinite(told) else np.nan)
@@ -143,7 +145,8 @@ class _Run:
     def _row(self) -> dict[str, Any]:
         told = np.array(self.told)
         if not np.isfinite(told).any():
-            raise ValueError(f"all {len(told)} trials failed")
+            first = self.failure or "it gave no finite number"
+            raise ValueError(f"all {len(told)} trials failed; the first: {first}")
         best = np.maximum.accumulate(np.where(np.isfinite(told), told, -np.inf))
         scores = np.array([self._score(u) for u in self.answers])
         split = [t + 1 for t, leaves in enumerate(self.leaves) if leaves > 1]

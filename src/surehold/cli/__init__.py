@@ -49,15 +49,27 @@ def _run(arguments: list[str]) -> int:
     except typer.Exit as end:
         return end.exit_code
     except exceptions.TyperException as error:
-        format_message = getattr(error, "format_message", None)
-        message = format_message() if format_message else str(error)
+        message = _in_words(error)
         if type(error).__name__ == "NoArgsIsHelpError":  # of a group alone; typer keeps the class to itself
             typer.echo(message)
             return 0
-        _say(f"{message} See surehold --help.")
+        command = getattr(getattr(error, "ctx", None), "command_path", "surehold")
+        _say(f"{message.rstrip('.')}. See {command} --help.")
         return int(getattr(error, "exit_code", 2))
     except typer.Abort:
         return _interrupted()
+
+
+def _in_words(error: Exception) -> str:
+    """Return what typer says of a mistake; of a text that is no number it says neither the text nor plainly why."""
+    format_message = getattr(error, "format_message", None)
+    message = format_message() if format_message else str(error)
+    found = getattr(error.__cause__, "errors", list)()  # of Pydantic
+    kind, given = (found[0].get("type", ""), found[0].get("input")) if found else ("", "")
+    number = {"int": "whole number", "float": "number"}.get(kind.partition("_")[0])
+    if number and ": Input should be" in message:
+        return f"{message.partition(': Input should be')[0]}: {str(given)[:60]!r} is no {number}"
+    return message
 
 
 def completed(arguments: list[str]) -> list[str]:

@@ -6,6 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
+from surehold.amounts import amount
+
 __all__ = ["campaigns"]
 
 Only = Annotated[
@@ -78,13 +80,13 @@ def run(
         (problem, method, seed), row = next(iter(records.failed.items()))
         reason = row["error"].rstrip(".")
         console.print(
-            f"{len(records.failed)} runs failed; the first: {method} on {problem}, seed {seed}: {reason}. "
+            f"{amount(len(records.failed), 'run')} failed; the first: {method} on {problem}, seed {seed}: {reason}. "
             "Make them again with --retry.",
             markup=False,
             soft_wrap=True,
         )
     console.print(
-        f"{len(records.done)} runs in {folder}. Compare them: surehold campaign report {folder}",
+        f"{amount(len(records.done), 'run')} in {folder}. Compare them: surehold campaign report {folder}",
         markup=False,
         soft_wrap=True,
     )

@@ -11,6 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
+from surehold.amounts import amount
+
 __all__ = ["doctor"]
 
 CORE = ("numpy", "scipy", "numba", "threadpoolctl", "lazy_loader")
@@ -46,7 +48,9 @@ def doctor(
     compiled, total = compiled_kernels()
     table.add_row("compiled kernels", f"{compiled} of {total} are in the cache; others are compiled when first used")
     folders = kernel_folders()
-    table.add_row("kernel cache", f"{len(folders)} folders in {os.path.commonpath(folders)}" if folders else "none")
+    table.add_row(
+        "kernel cache", f"{amount(len(folders), 'folder')} in {os.path.commonpath(folders)}" if folders else "none"
+    )
     if not missing("grasp"):
         table.add_row("data cache", data_cache())
     for name, found in graphics_libraries().items():
@@ -114,7 +118,7 @@ def data_cache() -> str:
 
     folder = cache_folder()
     sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
-    return f"{folder}: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB"
+    return f"{folder}: {amount(len(sizes), 'file')}, {sum(sizes) / 1e6:.1f} MB"
 
 
 def graphics_libraries() -> dict[str, str | None]:

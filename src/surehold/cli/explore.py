@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from surehold.amounts import amount
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.options import Noise, Open, Out, Seed, noise_of
 from surehold.cli.study_options import Storage
@@ -190,8 +191,9 @@ class _Run:
         scene = Scene((*shape_meshes(mean.vertices, mean.faces, deviation), truth), contacts)
         self.views.append(Candidate(f"after {n} touches", self.answer.x, float(n), scene=scene))
         text = (
-            f"After {n} touches, {len(self._felt)} contacts: surface off by {error.mean():.1f} mm, 95 % within "
-            f"{np.quantile(error, 0.95):.1f} mm; grasp believed {self.answer.mean:.3f}, true {self.true:.3f}."
+            f"After {n} touch{'es' * (n != 1)}, {amount(len(self._felt), 'contact')}: surface off by "
+            f"{error.mean():.1f} mm, 95 % within {np.quantile(error, 0.95):.1f} mm; grasp believed "
+            f"{self.answer.mean:.3f}, true {self.true:.3f}."
         )
         self.notes.append(text)
         shown = (error.mean(), np.quantile(error, 0.95), 1e3 * deviation.mean())
@@ -222,7 +224,7 @@ class _Run:
 
         grasp = self.real.grasp(self.answer.x)
         last = Candidate("the grasp, on the true shape", self.answer.x, -1.0, scene=drawn(self.real, grasp))
-        note = f"{grasp.status}, quality {grasp.quality:.3f} with {len(grasp.contacts)} contacts."
+        note = f"{grasp.status}, quality {grasp.quality:.3f} with {amount(len(grasp.contacts), 'contact')}."
         goal = "to find a safe grasp" if self.goal == "grasp" else "to know the shape"
         text = (
             f"Touched {goal}. Left what is believed, right the true shape: {LEGEND} The dots are contacts. "

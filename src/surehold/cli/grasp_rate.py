@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from surehold.amounts import amount
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.options import Seed
 
@@ -101,7 +102,7 @@ def _grasp_rate(
         stored.append(stored_grasp(hand, one.grasp, preshape, one.stored.name, worth))
     unsaid = "" if content.settings else " The file names no options; those not given have their defaults."
     console.print(
-        f"{file}: {len(rated)} grasps of hand {hand.name} on {body.name}, {simulator.quality} with "
+        f"{file}: {amount(len(rated), 'grasp')} of hand {hand.name} on {body.name}, {simulator.quality} with "
         f"{simulator.contact} contacts and friction {simulator.friction:g}{squeeze}.{unsaid}",
         markup=False,
         soft_wrap=True,

@@ -29,8 +29,9 @@ def synergy(
     from surehold.grasping.hand.postures import read_postures
     from surehold.problems.grasp.description import described_hand
 
-    recorded = read_postures(postures, degrees)
-    found = learn_synergy(recorded.joints, recorded.angles, described_hand(hand, hand_config), components)
+    gripper = described_hand(hand, hand_config)
+    recorded = read_postures(postures, degrees, [name for name in gripper.joint_names if name])
+    found = learn_synergy(recorded.joints, recorded.angles, gripper, components)
     write_synergy(out, found)
     console = terminal()
     console.print(

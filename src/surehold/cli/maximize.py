@@ -29,11 +29,6 @@ from surehold.cli.options import (
 )
 
 __all__ = ["maximize"]
-_SUCCESSES: dict[str, Any] = {
-    "quality_name": "success",
-    "success_above": 0.0,
-    "advice": "Give more trials, a wider box, or count as success what is easier to reach.",
-}
 
 
 class Defaults(NamedTuple):
@@ -132,7 +127,6 @@ def maximize(
         },
         direction=direction,
         outcome=outcome,
-        **(_SUCCESSES if outcome == "success" else {}),
         tolerate_failures=tolerate_failures,
         kept=kept,
         required=limits_given(constraint, allowed, feasible, failures, safety, first)

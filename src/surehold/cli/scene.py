@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from surehold.amounts import amount
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.options import Open, Out
 
@@ -67,8 +68,8 @@ def scene(
             views.append(Candidate(label, x, outcome.quality, scene=drawn))
             shares = f"{100.0 * free:.0f} % of {_ALONG * _ACROSS}"
             notes.append(
-                f"{label}: {outcome.status}, quality {outcome.quality:.3f} with {len(outcome.contacts)} contacts; "
-                f"{shares} poses start free of collision."
+                f"{label}: {outcome.status}, quality {outcome.quality:.3f} with "
+                f"{amount(len(outcome.contacts), 'contact')}; {shares} poses start free of collision."
             )
             default = problem.default
             place = f"{1e3 * x[0]:.0f}, {1e3 * x[1]:.0f}"

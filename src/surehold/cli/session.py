@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from surehold.amounts import amount
 from surehold.cli.compilation import announced, warm_up
 from surehold.cli.folders import folder_of
 from surehold.cli.interruption import terminable, undisturbed
@@ -77,7 +78,7 @@ def run_session(
     describe: Callable[[Candidate], Candidate] = lambda candidate: candidate,
     also_write: Callable[[RunReport, Path], None] = lambda report, folder: None,
     units: Mapping[str, str] | None = None,
-    quality_name: str = "value",
+    quality_name: str = "",
     disturbance: str = "the input is off",
     tolerate_failures: bool = False,
     direction: str = "maximize",
@@ -135,7 +136,7 @@ def run_session(
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
         console.print(
-            f"[bold]{_plain(title)}[/bold]: {trials} trials ({initial} initial), seed {seed}; "
+            f"[bold]{_plain(title)}[/bold]: {amount(trials, 'trial')} ({initial} initial), seed {seed}; "
             f"method {method} {METHODS[method]}"
         )
         with announced(console):
@@ -150,7 +151,7 @@ def run_session(
         else:
             result = _as_study(kept, problem, trials, options, units or {}, console)
         if result.interrupted:
-            console.print(f"Interrupted after {len(result.y)} of {trials} trials; keeping what was done.")
+            console.print(f"Interrupted after {len(result.y)} of {amount(trials, 'trial')}; keeping what was done.")
         notes = _failures(result)
         scores, missing = requeried(problem, result, gather.answers(result), noise, requeries, seed, console)
         notes = [*notes, *missing]
@@ -296,7 +297,7 @@ def _progress(
             progress.update(task, completed=done, description=phase, best=number(best), robust=robust)
             if not console.is_terminal and done % 10 == 0:
                 best_so_far = "" if counted else f"{extreme} {number(best)} "
-                console.print(f"{done} of {trials} trials: {best_so_far}{robust}".rstrip())
+                console.print(f"{done} of {amount(trials, 'trial')}: {best_so_far}{robust}".rstrip())
 
         yield show
 
@@ -306,7 +307,9 @@ def _failures(result: Result) -> list[str]:
     if not failed:
         return []
     first = failed[0]
-    return [f"{len(failed)} of {len(result.y)} trials failed; the first, trial {first.index}: {first.failure}"]
+    return [
+        f"{len(failed)} of {amount(len(result.y), 'trial')} failed; the first, trial {first.index}: {first.failure}"
+    ]
 
 
 def _show(report: RunReport, path: Path, seconds: float, console: Console) -> None:
@@ -328,7 +331,9 @@ def _show(report: RunReport, path: Path, seconds: float, console: Console) -> No
         console.print(f"Note: {_plain(note)}")
     failed = int(np.sum(report.failed))
     rest = f", {failed} failed" if failed else ""
-    console.print(f"{report.y.size} trials{rest} in {seconds:.1f} s. Report: {_plain(str(path))}", soft_wrap=True)
+    console.print(
+        f"{amount(report.y.size, 'trial')}{rest} in {seconds:.1f} s. Report: {_plain(str(path))}", soft_wrap=True
+    )
 
 
 def _any_above(result: Result, limit: float | None) -> bool:

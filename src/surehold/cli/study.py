@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from surehold.amounts import amount
 from surehold.cli import study_people, study_service
 from surehold.cli.options import Allowed, Constraint, Failures, First, Safety, Surrogate
 from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, quiet, say, write_out
@@ -203,7 +204,7 @@ def status(name: Name, storage: Storage = "", as_json: Json = False) -> None:
     found = status_of(opened(name, storage))
     lines = [
         f"study {name} in {found['storage']}: {found['state']}{' - ' * bool(found['reason'])}{found['reason']}",
-        f"  {found['trials']} trials: {found['complete']} complete, {found['failed']} failed, "
+        f"  {amount(found['trials'], 'trial')}: {found['complete']} complete, {found['failed']} failed, "
         f"{found['running']} running, {found['waiting']} waiting",
     ]
     if found["best_value"] is not None:

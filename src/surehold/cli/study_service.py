@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from surehold.amounts import amount
 from surehold.cli.study_options import Name, Storage, opened
 
 __all__ = ["commands"]
@@ -52,9 +53,9 @@ def work(
         try:
             work_on(study, attempt, lifetime=lifetime, most=trials, after=show)
         except KeyboardInterrupt:
-            console.print(f"Ended after {count} trials; the one under way is let go.", markup=False)
+            console.print(f"Ended after {amount(count, 'trial')}; the one under way is let go.", markup=False)
             raise SystemExit(130) from None  # typer.Exit(130) reads as an interruption with nothing to keep
-    console.print(f"Done: {count} trials by this worker.", markup=False)
+    console.print(f"Done: {amount(count, 'trial')} by this worker.", markup=False)
 
 
 def serve(

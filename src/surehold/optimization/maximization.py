@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.amounts import amount
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
 from surehold.optimization.evaluation import Evaluation, in_processes, one_by_one
@@ -150,7 +151,7 @@ class Result:
     def __repr__(self) -> str:
         failed = int(np.isnan(self.y).sum())
         parts = (
-            [f"{len(self.y)} trials"]
+            [amount(len(self.y), "trial")]
             + [f"{failed} failed"] * bool(failed)
             + [f"stopped by {self.stopped}"] * bool(self.stopped)
         )
@@ -166,7 +167,7 @@ class Result:
         cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
         said = (best.refused, best.warning)
         refused = "".join(f"<p>{escape(text)}</p>" for text in said if text)
-        return f"<table><caption>Recommended after {len(self.y)} trials</caption>{cells}</table>{refused}"
+        return f"<table><caption>Recommended after {amount(len(self.y), 'trial')}</caption>{cells}</table>{refused}"
 
 
 def maximize(

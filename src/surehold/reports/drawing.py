@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from surehold.reports.run_report import Candidate, RunReport, Surface
+from surehold.reports.scales import set_scale
 from surehold.reports.verdict import worth
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ __all__ = ["PALETTE", "draw_line", "draw_map", "draw_shake", "draw_trace", "mark
 
 #: Okabe and Ito's vermilion and blue (told apart by color-blind readers), darkened for contrast on white.
 PALETTE: Final = {"ink": "#1b1f25", "muted": "#68707b", "grid": "#d8dce2", "high": "#c24e00", "answer": "#0a65b3"}
+_SHARES: Final = (-0.05, 1.05)  # limits of an axis of shares, with room for marks at 0 and 1
+_ROUND: Final = 121  # points of an ellipse
 _MARKERS: Final = {"high": "^", "answer": "o"}
 _STYLE: Final = {
     "font.family": "sans-serif",
@@ -81,12 +84,14 @@ def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
     margin = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
     color = PALETTE[_role(report, candidate)]
     edges = np.linspace(low - margin, high + margin, 28)
+    if report.counted:
+        edges = np.linspace(*_SHARES, 12)  # a bin around 0 and one around 1
     tallest = max(np.histogram(c.values, edges)[0].max() for c in report.candidates)
     counts, _ = np.histogram(candidate.values, edges)
     axes.bar(edges[:-1], counts, np.diff(edges), align="edge", color=color, alpha=0.75, linewidth=0)
     axes.axvline(candidate.quality, color=PALETTE["ink"], linestyle=(0, (4, 2)), linewidth=1.2)
     axes.plot(candidate.mean, 0, marker="D", color=color, markeredgecolor=PALETTE["ink"], clip_on=False, zorder=5)
-    right = candidate.quality > 0.6 * high + 0.4 * low
+    right = candidate.quality > 0.6 * edges[-1] + 0.4 * edges[0]
     axes.annotate(
         "hit exactly",
         (candidate.quality, 1.0),
@@ -99,7 +104,7 @@ def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
     )
     axes.set_xlim(edges[0], edges[-1])
     axes.set_ylim(0.0, 1.18 * tallest)
-    axes.set_xlabel(f"{report.quality_name} (◆ mean {worth(report, candidate.mean)})")
+    axes.set_xlabel(f"{report.axis_name} (◆ mean {worth(report, candidate.mean)})")
     axes.set_ylabel("re-queries")
     axes.xaxis.set_major_locator(MaxNLocator(nbins=5))  # more would overlap where numbers are long
     axes.yaxis.set_major_locator(MaxNLocator(nbins=3, integer=True))
@@ -111,13 +116,16 @@ def draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> No
     both = [v for v in (view.mean, view.robust_mean) if v is not None]
     low, high = min(float(v.min()) for v in both), max(float(v.max()) for v in both)
     i, j = view.variables
-    first, second = report.variables[i], report.variables[j]
-    a, b = view.axes[0] * first.factor, view.axes[1] * second.factor
-    extent = (_edge(a, 0), _edge(a, -1), _edge(b, 0), _edge(b, -1))
+    pair = first, second = report.variables[i], report.variables[j]
+    a, b = (variable.shown(grid) for variable, grid in zip(pair, view.axes, strict=True))
+    for which, variable, grid in zip(("x", "y"), pair, view.axes, strict=True):
+        borders = variable.shown(np.array([_edge(grid, 0), _edge(grid, -1)])).tolist()
+        set_scale(axes, which, tuple(borders), log=variable.log, whole=variable.whole)
     image = axes.imshow(
         values.T,
         origin="lower",
-        extent=extent,
+        extent=(0.0, 1.0, 0.0, 1.0),
+        transform=axes.transAxes,  # the grid is even in the scale of the axes, which images know to be linear only
         aspect="auto",
         cmap="viridis",
         vmin=low,
@@ -136,7 +144,7 @@ def draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> No
             alpha=0.4,
         )
     sliced = len(report.variables) > 2
-    X = report.X[:, [i, j]] * [first.factor, second.factor]
+    X = np.column_stack([first.shown(report.X[:, i]), second.shown(report.X[:, j])])
     alpha = 0.45 if sliced else 0.95
     marks = marked(report, view)
     empty, full, cross = (X[marks[name]].T for name in ("trials-initial", "trials-later", "trials-failed"))
@@ -145,32 +153,29 @@ def draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> No
     axes.scatter(*cross, s=18, c="white", marker="x", linewidths=1.0, alpha=alpha, gid="trials-failed")
     for candidate in report.candidates:
         _draw_candidate(axes, report, candidate, (i, j))
-    axes.set(xlabel=first.label, ylabel=second.label, xlim=extent[:2], ylim=extent[2:])
+    axes.set(xlabel=first.label, ylabel=second.label)
     axes.set_title("Unscented mean (over the input noise)" if robust else "Model mean (input hit exactly)")
     bar = axes.figure.colorbar(image, ax=axes, fraction=0.05, pad=0.02, aspect=25)
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
-    bar.set_label(report.quality_name)
+    bar.set_label(report.axis_name)
 
 
 def _draw_candidate(axes: "Axes", report: RunReport, candidate: Candidate, pair: tuple[int, int]) -> None:
-    from matplotlib.patches import Ellipse
-
     role = _role(report, candidate)
-    scale = np.array([report.variables[k].factor for k in pair])
-    center = candidate.x[list(pair)] * scale
+    center = candidate.x[list(pair)]
+
+    def shown(points: np.ndarray) -> list[np.ndarray]:
+        return [report.variables[k].shown(column) for k, column in zip(pair, points.T, strict=True)]
+
     if candidate.noise is not None:
-        covariance = candidate.noise[np.ix_(pair, pair)] * np.outer(scale, scale)
-        values, vectors = np.linalg.eigh(covariance)
-        angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
-        width, height = 4.0 * np.sqrt(np.maximum(values[::-1], 0.0))  # two standard deviations to each side
+        values, vectors = np.linalg.eigh(candidate.noise[np.ix_(pair, pair)])
+        turn = np.linspace(0.0, 2.0 * np.pi, _ROUND)
+        circle = np.column_stack([np.cos(turn), np.sin(turn)])
+        ellipse = center + (2.0 * np.sqrt(np.maximum(values, 0.0)) * circle) @ vectors.T  # two standard deviations
         for line, color in ((2.6, "white"), (1.4, PALETTE[role])):
-            axes.add_patch(
-                Ellipse(
-                    tuple(center), width, height, angle=angle, fill=False, edgecolor=color, linewidth=line, zorder=4
-                )
-            )
+            axes.plot(*shown(ellipse), color=color, linewidth=line, zorder=4)
     axes.plot(
-        *center,
+        *shown(center[None, :]),
         marker=_MARKERS[role],
         color=PALETTE[role],
         markersize=9,
@@ -184,7 +189,7 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
     """Draw the model over one variable, its average over the noise, the trials and the candidates."""
     (i,) = view.variables
     variable = report.variables[i]
-    t = view.axes[0] * variable.factor
+    t = variable.shown(view.axes[0])
     if view.std is not None:
         low, high = view.mean - 2 * view.std, view.mean + 2 * view.std
         if report.counted:
@@ -195,14 +200,15 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
         axes.plot(t, view.robust_mean, color=PALETTE["answer"], linewidth=2.0, label="averaged over the input noise")
     ok = marked(report, view)["trials-told"]
     told = {"s": 12, "color": PALETTE["muted"], "gid": "trials-told", "label": "trials", "zorder": 2.5}
-    axes.scatter(report.X[ok, i] * variable.factor, report.y[ok], **told)
+    axes.scatter(variable.shown(report.X[ok, i]), report.y[ok], **told)
     for candidate in report.candidates:
         role = _role(report, candidate)
-        spread = 0.0 if candidate.noise is None else 2.0 * float(np.sqrt(candidate.noise[i, i])) * variable.factor
+        spread = 0.0 if candidate.noise is None else 2.0 * float(np.sqrt(candidate.noise[i, i]))
+        low, x, high = variable.shown(candidate.x[i] + spread * np.array([-1.0, 0.0, 1.0]))
         axes.errorbar(
-            candidate.x[i] * variable.factor,
+            x,
             candidate.quality,
-            xerr=spread or None,
+            xerr=[[x - low], [high - x]] if spread else None,
             fmt=_MARKERS[role],
             color=PALETTE[role],
             markersize=9,
@@ -214,8 +220,9 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
         )
     everything = np.concatenate([view.mean, report.y[ok]])
     margin = 0.25 * (everything.max() - everything.min()) or 1.0
-    axes.set(xlabel=variable.label, ylabel=report.quality_name, xlim=(t[0], t[-1]))
-    axes.set_ylim(everything.min() - margin, everything.max() + margin)
+    set_scale(axes, "x", (t[0], t[-1]), log=variable.log, whole=variable.whole)
+    axes.set(xlabel=variable.label, ylabel=report.axis_name)
+    axes.set_ylim(_SHARES if report.counted else (everything.min() - margin, everything.max() + margin))
     _legend_above(axes)
     axes.set_title("Model and trials")
 
@@ -264,7 +271,10 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             color=PALETTE["muted"],
         )
     axes.margins(y=0.12)
-    axes.set(xlabel="trial, from 0", ylabel=report.quality_name, xlim=(-0.5, max(k[-1] + 0.5, 0.6) if k.size else 0.6))
+    if report.counted:
+        axes.set_ylim(_SHARES)
+    set_scale(axes, "x", (-0.5, max(k[-1] + 0.5, 0.6) if k.size else 0.6), whole=True)
+    axes.set(xlabel="trial, from 0", ylabel=report.axis_name)
     axes.grid(axis="y", linewidth=0.6)
     axes.set_axisbelow(True)
     _legend_above(axes)

@@ -12,6 +12,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.maximization import Result
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.recommendation import outliers_in_words
+from surehold.optimization.variables import Number
 from surehold.problems.perturbation import RobustScore
 from surehold.reports.run_report import (
     Candidate,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["answers", "candidate", "drawn_scene", "expected", "report_of"]
 
 _SHARES = (0.9, 0.99)  # of executions that succeed, of which the page says how sure they are
+_ADVICE = "Give more trials, a wider box, or count as success what is easier to reach."
 _OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
 
 
@@ -126,7 +128,7 @@ def report_of(
     settings: Mapping[str, Any],
     noise: InputNoise | None,
     units: Mapping[str, str] | None = None,
-    quality_name: str = "value",
+    quality_name: str = "",
     disturbance: str = "the input is off",
     planned_trials: int | None = None,
     notes: Sequence[str] = (),
@@ -148,8 +150,11 @@ def report_of(
         Text of each trial for parameters that are no numbers, by name.
     hidden
         Coordinates of the box that say nothing to a reader: those in which the choices are coded.
+    quality_name
+        By default "value", or "success" where trials succeed or fail.
     success_above, outcomes, advice
-        Of `RunReport`: what counts as a success, and what is said where there was none.
+        Of `RunReport`: what counts as a success, and what is said where there was none. Where trials succeed or fail, a
+        share above 0 does.
 
     Raises
     ------
@@ -165,8 +170,9 @@ def report_of(
             )
     shown = [i for i, name in enumerate(box.names) if name not in hidden]
     held = np.zeros(box.dimension, dtype=bool) if box.uncontrolled is None else box.uncontrolled.held
+    whole = {variable.name for variable in box.variables if isinstance(variable, Number) and variable.integer}
     variables = tuple(
-        Variable(name, float(lower), float(upper), (units or {}).get(name, ""), bool(drawn))
+        Variable(name, float(lower), float(upper), (units or {}).get(name, ""), bool(drawn), name in whole)
         for name, lower, upper, drawn in zip(box.names, box.lower, box.upper, held, strict=True)
         if name not in hidden
     )
@@ -196,12 +202,12 @@ def report_of(
         ),
         settings=settings,
         seed=optimizer.seed,
-        quality_name=quality_name,
+        quality_name=quality_name or ("success" if counted else "value"),
         disturbance=disturbance,
         robust_trace=robust if np.isfinite(robust).any() else None,
-        success_above=success_above,
+        success_above=0.0 if counted and success_above is None else success_above,
         outcomes=outcomes or {},
-        advice=advice,
+        advice=advice or _ADVICE * counted,
         infeasible=result.recommendation.infeasible,
         surfaces=surfaces_of(optimizer, noise, [c.x for c in candidates], shown),
         warning=result.recommendation.warning,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.reports.run_report import RunReport, Surface, Variable
+from surehold.reports.run_report import RunReport, Surface
 
 __all__ = ["interactive_plots"]
 
@@ -42,12 +42,12 @@ def _progress(report: RunReport) -> dict[str, Any]:
                 number[known], report.robust_trace[known], "recommended, expected under the noise", _ANSWER, shape="hv"
             )
         )
-    return _plot(f"{report.extreme.capitalize()} observed and robust value", data, "trial", report.quality_name)
+    return _plot(f"{report.extreme.capitalize()} observed and robust value", data, "trial", report.axis_name)
 
 
 def _line(report: RunReport, surface: Surface) -> dict[str, Any]:
     variable = report.variables[surface.variables[0]]
-    grid = surface.axes[0] * variable.factor
+    grid = variable.shown(surface.axes[0])
     data = [_curve(grid, surface.mean, "model", _TRIAL)]
     if surface.std is not None:
         band = np.concatenate([surface.mean + 2.0 * surface.std, (surface.mean - 2.0 * surface.std)[::-1]])
@@ -56,18 +56,17 @@ def _line(report: RunReport, surface: Surface) -> dict[str, Any]:
         data.insert(0, _curve(around, band, "± 2 standard deviations", _TRIAL) | shade)
     if surface.robust_mean is not None:
         data.append(_curve(grid, surface.robust_mean, "under the input noise (unscented mean)", _ANSWER))
-    column = report.X[:, surface.variables[0]] * variable.factor
+    column = variable.shown(report.X[:, surface.variables[0]])
     data.append(_points(column, report.y, "trials", {"color": _TRIAL, "size": 6}))
     for x, y, name, color in _candidates(report):
-        data.append(
-            _points(x[surface.variables[0] : surface.variables[0] + 1] * variable.factor, y, name, _mark(color))
-        )
-    return _plot("Model" + _aside(surface), data, variable.label, report.quality_name)
+        spot = variable.shown(x[surface.variables[0] : surface.variables[0] + 1])
+        data.append(_points(spot, y, name, _mark(color)))
+    return _plot("Model" + _aside(surface), data, variable.label, report.axis_name, log=(variable.log, False))
 
 
 def _map(report: RunReport, surface: Surface, values: NDArray[np.floating], title: str) -> dict[str, Any]:
     first, second = (report.variables[k] for k in surface.variables)
-    across, up = (_scaled(axis, v) for axis, v in zip(surface.axes, (first, second), strict=True))
+    across, up = (v.shown(axis) for axis, v in zip(surface.axes, (first, second), strict=True))
     data: list[dict[str, Any]] = [
         {
             "type": "heatmap",
@@ -75,16 +74,16 @@ def _map(report: RunReport, surface: Surface, values: NDArray[np.floating], titl
             "y": _numbers(up),
             "z": [_numbers(row) for row in values.T],
             "colorscale": "Viridis",
-            "colorbar": {"title": {"text": report.quality_name}},
+            "colorbar": {"title": {"text": report.axis_name}},
         }
     ]
     a, b = surface.variables
     marker = {"color": "white", "size": 5, "line": {"color": "black", "width": 1}}
-    data.append(_points(_scaled(report.X[:, a], first), _scaled(report.X[:, b], second), "trials", marker))
+    data.append(_points(first.shown(report.X[:, a]), second.shown(report.X[:, b]), "trials", marker))
     for x, _, name, color in _candidates(report):
-        spot = _scaled(x[a : a + 1], first), _scaled(x[b : b + 1], second)
+        spot = first.shown(x[a : a + 1]), second.shown(x[b : b + 1])
         data.append(_points(*spot, name, _mark(color)))
-    return _plot(title + _aside(surface), data, first.label, second.label)
+    return _plot(title + _aside(surface), data, first.label, second.label, log=(first.log, second.log))
 
 
 def _aside(surface: Surface) -> str:
@@ -96,10 +95,6 @@ def _candidates(report: RunReport) -> list[tuple[NDArray[np.floating], NDArray[n
     if report.observed is not report.recommended:
         found.insert(0, (report.observed, f"{report.extreme} observed", _HIGHEST))
     return [(c.x, np.array([c.quality]), name, color) for c, name, color in found]
-
-
-def _scaled(values: NDArray[np.floating], variable: Variable) -> NDArray[np.floating]:
-    return values * variable.factor
 
 
 def _mark(color: str) -> dict[str, Any]:
@@ -115,11 +110,13 @@ def _curve(x: NDArray[Any], y: NDArray[Any], name: str, color: str, shape: str =
     return {"type": "scatter", "mode": "lines", "x": _numbers(x), "y": _numbers(y), "name": name, "line": line}
 
 
-def _plot(title: str, data: list[dict[str, Any]], across: str, up: str) -> dict[str, Any]:
+def _plot(
+    title: str, data: list[dict[str, Any]], across: str, up: str, log: tuple[bool, bool] = (False, False)
+) -> dict[str, Any]:
     layout = {
         "title": {"text": title, "x": 0.02, "font": {"size": 14}},  # beside the buttons at the right
-        "xaxis": {"title": {"text": across}},
-        "yaxis": {"title": {"text": up}},
+        "xaxis": {"title": {"text": across}} | ({"type": "log"} if log[0] else {}),
+        "yaxis": {"title": {"text": up}} | ({"type": "log"} if log[1] else {}),
         "modebar": {"remove": ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d"]},
         "margin": {"t": 56, "r": 24, "b": 60 + 19 * len(data)},  # the names below each other, where it is narrow
         "legend": {"orientation": "h", "yref": "container", "y": 0.0, "yanchor": "bottom"},

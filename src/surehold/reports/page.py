@@ -193,15 +193,19 @@ def _noise_text(report: RunReport) -> str:
     if report.noise is None:
         return ""
     deviations = np.sqrt(np.diag(report.noise))
-    shown = [
-        f"{v.name} ± {number(s * v.factor, 2)}{'' if v.shown_unit in ('', '°') else ' '}{v.shown_unit}"
-        for v, s in zip(report.variables, deviations, strict=True)
-    ]
+    shown = [_deviation(v, float(s)) for v, s in zip(report.variables, deviations, strict=True)]
     if len(shown) > 4:
         shares = deviations / np.array([v.upper - v.lower for v in report.variables])
         if np.allclose(shares, shares[0]):
             return f"± {number(100.0 * float(shares[0]), 2)} % of each range"
     return ", ".join(shown)
+
+
+def _deviation(variable: Variable, deviation: float) -> str:
+    if variable.log:  # of the logarithm, which has no unit
+        return f"ln {variable.name} ± {number(deviation, 2)}"
+    space = "" if variable.shown_unit in ("", "°") else " "
+    return f"{variable.name} ± {number(deviation * variable.factor, 2)}{space}{variable.shown_unit}"
 
 
 def _hover(report: RunReport, trials: list[dict[str, Any]], view: Surface | None = None) -> dict[str, list[str]]:
@@ -272,8 +276,7 @@ def _expected(report: RunReport, candidate: Candidate, deviation: float | None) 
 
 
 def _heading(variable: Variable) -> str:
-    unit = f" [{variable.table_unit}]" if variable.table_unit else ""
-    return f"{variable.name}{unit}{' (drawn)' * variable.drawn}"
+    return f"{variable.label}{' (drawn)' * variable.drawn}"
 
 
 def _setting(value: Any) -> str:

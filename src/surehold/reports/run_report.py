@@ -30,13 +30,14 @@ Floats = NDArray[np.floating]
 
 @dataclass(frozen=True)
 class Variable:
-    """One input. Lengths in m and angles in rad are shown in mm and degrees."""
+    """One input. Lengths in m and angles in rad are shown in mm and degrees, logarithms as what they stand for."""
 
     name: str
     lower: float
     upper: float
     unit: str = ""  #: "m", "rad", any other unit as text, or "" for none
     drawn: bool = False  #: whether nobody sets it, see `optimization.uncontrolled`
+    whole: bool = False  #: whether it takes whole numbers only
 
     @property
     def factor(self) -> float:
@@ -46,22 +47,23 @@ class Variable:
     @property
     def shown_unit(self) -> str:
         """The unit that is shown."""
+        if self.log:
+            return self.unit[3:].strip()
         return {"m": "mm", "rad": "°"}.get(self.unit, self.unit)
 
     @property
     def label(self) -> str:
-        """Name and shown unit, as on an axis."""
+        """Name and shown unit, as on an axis and at the head of a column."""
         return f"{self.name} [{self.shown_unit}]" if self.shown_unit else self.name
 
     @property
     def log(self) -> bool:
-        """Whether values are natural logarithms: figures show them as they are, tables and text what they stand for."""
+        """Whether values are natural logarithms."""
         return self.unit.split(" ")[0] == "log"
 
-    @property
-    def table_unit(self) -> str:
-        """The unit in tables and text."""
-        return self.shown_unit[3:].strip() if self.log else self.shown_unit
+    def shown(self, values: Floats) -> Floats:
+        """Return values of the box as they are shown."""
+        return np.exp(values) if self.log else values * self.factor
 
     @property
     def more_digits(self) -> int:
@@ -243,6 +245,11 @@ class RunReport:
     def noise(self) -> Floats | None:
         """(d, d) covariance of the input noise at the recommended point, in the units of the box."""
         return self.recommended.noise
+
+    @property
+    def axis_name(self) -> str:
+        """What values are called on an axis, where those of trials that succeed or fail are shares."""
+        return "share of executions that succeed" if self.counted else self.quality_name
 
     @property
     def succeeded(self) -> bool:

@@ -12,6 +12,7 @@ from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.protocol import mixture
 from surehold.optimization.variables import Choice, Number
 from surehold.reports.drawing import PALETTE, style
+from surehold.reports.scales import set_scale
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,10 +84,8 @@ def _draw_number(axes: Any, optimizer: Optimizer, center: NDArray[np.float64], v
         shown(optimizer.reached[told, k]), optimizer.y[told], "o", color=PALETTE["muted"], markersize=3, label=_TRIALS
     )
     axes.axvline(shown(center[k]), color=PALETTE["high"], linestyle=(0, (4, 2)), linewidth=1.1, label="the point")
-    axes.set(xlabel=variable.name, xlim=(t[0], t[-1]), xscale="log" if variable.log else "linear")
-    if variable.log:
-        axes.xaxis.set_major_formatter("{x:g}")
-        axes.xaxis.set_minor_formatter("")
+    axes.set_xlabel(variable.name)
+    set_scale(axes, "x", (t[0], t[-1]), log=variable.log, whole=variable.integer)
 
 
 def _draw_choice(axes: Any, optimizer: Optimizer, center: NDArray[np.float64], variable: Choice) -> None:

@@ -12,6 +12,7 @@ from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.protocol import Posterior, mixture
+from surehold.optimization.variables import Number
 from surehold.reports.run_report import Surface
 
 __all__ = ["surfaces_of"]
@@ -50,7 +51,9 @@ def surfaces_of(
     views = [(whole, note)]
     if noise is not None:
         close = _around(box, noise, candidates, over)
-        if np.all(close[:, 1] - close[:, 0] < _CLOSE):
+        narrower = close[:, 1] - close[:, 0] < _CLOSE
+        stepped = [box.names[k] in _stepped(box) for k in over]  # of few levels all are seen in both views
+        if narrower.any() and np.all(narrower | stepped):
             views.append((close, f"{note}{', ' * bool(note)}close to the answer"))
     sign = -1.0 if optimizer.direction == "minimize" else 1.0
     return tuple(
@@ -65,16 +68,34 @@ def surfaces_of(
 def _around(
     box: Box, noise: InputNoise, candidates: Sequence[NDArray[np.floating]], over: Sequence[int]
 ) -> NDArray[np.float64]:
-    """Return limits (v, 2) in the unit cube that hold the candidates and where they may end up, within the cube."""
+    """Return limits (v, 2) in the unit cube that hold the candidates and where they may end up, within the cube.
+
+    Of a variable with steps they hold the levels beside the candidates: between two levels there is nothing to see.
+    """
     limits = []
     for x in candidates:
         deviations = np.sqrt(np.diag(noise.unit_covariance(box, x)))[over]
         u = np.clip(box.to_unit(x), 0.0, 1.0)[over]
         margin = np.maximum(_MARGIN * deviations, 0.02)
-        limits.append((u - margin, u + margin))
+        levels = np.array([_levels_beside(box, k, float(x[k])) for k in over])
+        limits.append((np.minimum(u - margin, levels[:, 0]), np.maximum(u + margin, levels[:, 1])))
     lower = np.min([low for low, _ in limits], axis=0)
     upper = np.max([high for _, high in limits], axis=0)
     return np.clip(np.stack([lower, upper], axis=1), 0.0, 1.0)
+
+
+def _stepped(box: Box) -> dict[str, Number]:
+    return {variable.name: variable for variable in box.variables if isinstance(variable, Number) and variable.step}
+
+
+def _levels_beside(box: Box, k: int, coordinate: float) -> NDArray[np.float64]:
+    """Return the levels (2,) below and above one along axis k of the unit cube; where there are no steps, it twice."""
+    beside = np.full(2, coordinate)
+    if (variable := _stepped(box).get(box.names[k])) is not None:
+        steps = variable.to_value(beside) + variable.step * np.array([-1.0, 1.0])
+        low, high = np.exp(variable.bounds()) if variable.log else variable.bounds()
+        beside = variable.to_coordinate(np.clip(steps, low, high))
+    return (beside - box.lower[k]) / box.widths[k]
 
 
 def _surface(

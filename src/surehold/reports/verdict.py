@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from surehold.amounts import amount
 from surehold.reports.run_report import Candidate, RunReport, Variable
 
 _NOTABLE: Final = 0.1  # share of the range of the values met from which on bad cases count as different
@@ -51,7 +52,9 @@ def _said(report: RunReport) -> Callable[[float | None], str]:
 
 def coordinate(variable: Variable, value: float, digits: int = 3) -> str:
     """Return a value of a variable as people write it, without its unit."""
-    plain = math.exp(value) if variable.log else float(value) * variable.factor
+    plain = float(variable.shown(np.float64(value)))  # type: ignore[arg-type]
+    if variable.whole and abs(plain - round(plain)) < 1e-6 * max(abs(plain), 1.0) < 1e9:
+        return f"{round(plain)}".replace("-", "−")
     return number(plain, digits + variable.more_digits)
 
 
@@ -59,7 +62,7 @@ def coordinates(report: RunReport, candidate: Candidate) -> str:
     """Return where a candidate is, as `dx = 3.1 mm, rx = 12°`."""
     parts = []
     for variable, value in zip(report.variables, candidate.x, strict=True):
-        unit = variable.table_unit
+        unit = variable.shown_unit
         space = "" if unit in ("", "°") else " "
         parts.append(f"{variable.name} = {coordinate(variable, value)}{space}{unit}{' (drawn)' * variable.drawn}")
     if candidate.trial is not None:
@@ -85,7 +88,7 @@ def _of_the_run(report: RunReport) -> Verdict:
         return _of_successes(report)
     if told.size > 1 and told.max() == told.min():
         return Verdict(
-            f"All {told.size} trials gave the same {name}, {said(float(told[0]))}: nothing was found.",
+            f"All {amount(told.size, 'trial')} gave the same {name}, {said(float(told[0]))}: nothing was found.",
             "There is no better or worse to learn from yet, so the point shown is only the first. Run more trials, or "
             "narrow the search to where outcomes differ.",
             False,
@@ -178,7 +181,7 @@ def _of_nothing(report: RunReport) -> Verdict:
     ended = "; ".join(f"{n} × {status}" for status, n in counts)
     met = f": no {report.quality_name} above {number(report.success_above)} was met" * (not report.counted)
     return Verdict(
-        f"None of {report.y.size} trials succeeded{met}.",
+        f"None of {amount(report.y.size, 'trial')} succeeded{met}.",
         f"{f'How they ended: {ended}. ' if ended else ''}The point shown is no answer. {report.advice}".strip(),
         False,
     )
@@ -194,9 +197,9 @@ def _of_successes(report: RunReport) -> Verdict:
     where = f"{coordinates(report, answer)} ({_trial(report, answer)})"
     sure = " ".join(f"The model is {value} {name}." for name, value in answer.details.items() if name[:5] == "sure ")
     share = percent(float(told.mean()))
-    made = f"{share} of the {told.size} trials succeeded"
+    made = f"{share} of the {amount(told.size, 'trial')} succeeded"
     if np.any((told > 0.0) & (told < 1.0)):
-        made = f"The {told.size} trials succeeded in {share} of their executions on average"
+        made = f"The {amount(told.size, 'trial')} succeeded in {share} of their executions on average"
     return Verdict(
         f"The recommended point is {expected}{again}.",
         f"It is {where}. {made}, those made to learn included. {sure}".strip(),

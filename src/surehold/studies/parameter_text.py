@@ -65,6 +65,10 @@ def _distribution(name: str, described: str) -> BaseDistribution:
             return CategoricalDistribution([choice.strip() for choice in described.split(between)])
     lower, *rest = described.split(":")
     if not rest:
+        try:
+            float(described)
+        except ValueError:
+            raise ValueError(f"{described!r} is neither a range nor a choice of several") from None
         raise ValueError("one number is no range")
     options: Mapping[str, Any] = dict(_option(option.strip()) for option in rest[1:])
     whole, log = bool(options.get("int")), bool(options.get("log"))

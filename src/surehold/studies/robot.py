@@ -93,7 +93,10 @@ class RobotStudy(OpenedStudy):
                 return self._asked(trial, True)
             reason, promise = self._stop_reason(trials, now)
             if reason:
-                message = f"study '{self.name}' has stopped: {reason}. Change its stop rule to go on."
+                message = (
+                    f"study '{self.name}' has stopped: {reason}. To go on change its stop rule: "
+                    f"surehold study stop {self.name}, with another --trials, or without options to ask without end."
+                )
                 raise NothingToAsk(message, paused=False)
             holder = Holder(worker or "", until, 1)
             if any(t.state == TrialState.WAITING for t in trials):  # enqueued by Optuna's means

@@ -12,20 +12,18 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Annotated, Any, Final
 
-from fastapi import Depends, FastAPI, HTTPException, Path, Request
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import HTMLResponse, JSONResponse
+from fastapi import Depends, FastAPI, HTTPException, Path
+from fastapi.responses import HTMLResponse
 from fastapi.security import HTTPBearer
 
 from surehold import __version__
-from surehold.errors import InputError, SureholdError
+from surehold.errors import InputError
 from surehold.studies import service_messages as wire
-from surehold.studies.ledger import AnswerRefused, UnknownTrial
 from surehold.studies.prepared import Prepared
-from surehold.studies.robot import NothingToAsk, RobotStudy
+from surehold.studies.robot import RobotStudy
 from surehold.studies.service_guard import PATIENCE, Guard, Impatience
+from surehold.studies.service_mistakes import say_what_is_wrong
 from surehold.studies.status import rows, status
-from surehold.studies.storage import StorageFailure
 
 __all__ = ["HOST", "Server", "listening", "new_token", "service"]
 
@@ -115,7 +113,7 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
         lifespan=life,
     )
     app.add_middleware(Guard, token=token, patience=patience)
-    _say_what_is_wrong(app)
+    say_what_is_wrong(app, study.name, study.settings.optimizer.get("outcome") == "success")
     writing = threading.Lock()  # one recommendation is written at a time
     protected: dict[str, Any] = {"dependencies": [Depends(_bearer), Depends(served)]}  # Guard has checked the token
 
@@ -202,28 +200,6 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
         return wire.State(name=study.name, state="open")
 
     return app
-
-
-def _say_what_is_wrong(app: FastAPI) -> None:
-    def answer(code: int, detail: str) -> JSONResponse:
-        return JSONResponse({"detail": " ".join(detail.split())}, code)
-
-    @app.exception_handler(RequestValidationError)
-    def malformed(_: Request, error: RequestValidationError) -> JSONResponse:
-        # Not the default answer: it repeats the input, which may hold what JSON cannot (NaN).
-        wrong = [f"{'.'.join(str(part) for part in e['loc'])}: {e['msg']}" for e in error.errors()]
-        return answer(422, "; ".join(wrong))
-
-    @app.exception_handler(SureholdError)
-    def refused(_: Request, error: SureholdError) -> JSONResponse:
-        codes = (
-            (StorageFailure, 503),
-            (UnknownTrial, 404),
-            (AnswerRefused, 409),
-            (InputError, 422),
-            (NothingToAsk, 409),
-        )
-        return answer(next((code for kind, code in codes if isinstance(error, kind)), 409), str(error))
 
 
 def _page(app: FastAPI) -> str:

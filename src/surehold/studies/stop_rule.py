@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from math import isfinite
 from typing import Any
 
+from surehold.amounts import amount
 from surehold.errors import InputError
 
 __all__ = ["StopRule"]
@@ -47,7 +48,7 @@ class StopRule:
             What the latest trials, and the one that would be asked next, promised; oldest first.
         """
         if self.trials is not None and trials >= self.trials:
-            return f"the budget of {self.trials} trials is used up"
+            return f"the budget of {amount(self.trials, 'trial')} is used up"
         if self.until is not None and now >= self.until:
             return f"its time ended at {_moment(self.until)}"
         last = promises[-self.asks :]
@@ -61,7 +62,7 @@ class StopRule:
     def __str__(self) -> str:
         """Return in words when asking ends."""
         parts = [
-            *([f"after {self.trials} trials in all"] if self.trials is not None else []),
+            *([f"after {amount(self.trials, 'trial')} in all"] if self.trials is not None else []),
             *([f"at {_moment(self.until)}"] if self.until is not None else []),
             *(
                 [f"when {self.asks} trials in a row promise less than {self.improvement:g}"]

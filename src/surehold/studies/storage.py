@@ -240,11 +240,16 @@ def _is_operation(line: bytes) -> bool:
         return False
 
 
+def _missing(shown: str, path: Path) -> InputError:
+    looked = "" if path.is_absolute() else f" in this folder ({str(path.absolute())!r} was looked for)"
+    return InputError(f"storage {shown!r} does not exist{looked}; give --storage, or create the study first.")
+
+
 def _journal(path: Path, create: bool) -> Storage:
     if path.is_dir():
         path = path / JOURNAL
     if not path.exists() and not create:
-        raise InputError(f"storage {str(path)!r} does not exist; give --storage, or create the study first.")
+        raise _missing(str(path), path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(path, "ab+") as journal:
@@ -276,7 +281,7 @@ def _sqlite(url: str, create: bool) -> Storage:
         raise InputError(f"storage {url!r} names no file; give sqlite:///path/to/file.db, or memory.")
     path = Path(file)
     if not path.exists() and not create:
-        raise InputError(f"storage {url!r} does not exist; give --storage, or create the study first.")
+        raise _missing(url, path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(path, "ab"):

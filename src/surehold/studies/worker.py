@@ -99,8 +99,8 @@ def work(
                 break
             if not waiting and not nothing.paused and seconds is not None and seconds > _POLL:
                 _log.warning(
-                    f"Waiting for the last trials of other workers; those of one that is silent are handed out again in "
-                    f"{seconds:.0f} s. Ctrl-C leaves them."
+                    "Waiting for the last trials of other workers; those of one that is silent are handed out again "
+                    f"in {seconds:.0f} s. Ctrl-C leaves them."
                 )
             waiting = True
             time.sleep(_POLL)

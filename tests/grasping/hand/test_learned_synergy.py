@@ -91,6 +91,12 @@ def test_a_synergy_comes_back_and_a_bad_one_is_refused(tmp_path):
             read_synergy(path)
 
 
+def test_a_column_that_is_no_joint_is_named(tmp_path):
+    (tmp_path / "p.csv").write_text("a,b,subject\n1,2,ann\n")
+    with pytest.raises(InputError, match="column 'subject' is no joint of the hand; leave it out"):
+        read_postures(tmp_path / "p.csv", of=["a", "b"])
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

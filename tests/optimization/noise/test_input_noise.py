@@ -39,6 +39,7 @@ def test_a_variable_may_be_exact():
         (lambda: InputNoise({"a": 1.0}, covariance=np.eye(2)), "not both or neither"),
         (lambda: InputNoise({"a": -1.0, "b": 1.0}), "0 or more"),
         (lambda: InputNoise({"a": np.nan, "b": 1.0}), "finite"),
+        (lambda: InputNoise({"a": 3e198, "b": 1.0}), r"3e\+198; .* up to 1e\+150"),
         (lambda: InputNoise({"a": "much", "b": 1.0}), "finite"),
         (lambda: InputNoise({"a": 0.0, "b": 0.0}), "no noise"),
         (lambda: InputNoise({}), "give"),

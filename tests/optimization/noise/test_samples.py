@@ -91,7 +91,9 @@ def test_stored_and_restored():
     ("errors", "message"),
     [
         ([1.0], "two or more rows"),
-        ([0.1, 0.1], "an offset is no noise"),
+        ([0.1, 0.1], "2 rows of 1 column for as many variables: an offset is no noise"),
+        (np.zeros((10, 2)), "10 rows of 2 columns for as many variables"),
+        ([[np.nan]], r"hold \[nan\] in row 0"),
         ([[0.1], [np.nan]], "row 1"),
         (["a", "b"], "no numbers"),
         (np.zeros((3, 2, 2)), "have shape"),

@@ -10,13 +10,14 @@ Angles are in radians, or in degrees if it is said; shifts of sliding joints are
 
 import csv
 import io
+from collections.abc import Collection
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import InputError
+from surehold.errors import InputError, unknown_name
 from surehold.grasping.plain_data import regular_bytes
 
 __all__ = ["Postures", "read_postures"]
@@ -33,14 +34,14 @@ class Postures(NamedTuple):
     grasps: tuple[str, ...]  #: (n,) names; empty without such a column
 
 
-def read_postures(path: str | Path, degrees: bool = False) -> Postures:
-    """Read recorded postures.
+def read_postures(path: str | Path, degrees: bool = False, of: Collection[str] = ()) -> Postures:
+    """Read recorded postures; `of` are the joints of the hand, where those are known.
 
     Raises
     ------
     InputError
-        If the file cannot be read, a joint is given twice, a row is too short or too long, or an entry is no finite
-        number; the message names row and column.
+        If the file cannot be read, a joint is given twice or is none of the hand, a row is too short or too long, or an
+        entry is no finite number; the message names row and column.
     """
     where = str(path)
     try:
@@ -56,6 +57,12 @@ def read_postures(path: str | Path, degrees: bool = False) -> Postures:
     joints = [name for name in names if name != _LABEL]
     if not joints or len(names) > _MOST_COLUMNS or len(set(names)) != len(names) or "" in names:
         raise InputError(f"{where!r}: its first row must name up to {_MOST_COLUMNS} joints, each once.")
+    for name in joints if of else ():
+        if name not in of:
+            unknown = unknown_name("joint", name[:40], of)
+            raise InputError(
+                f"{where!r}: column {name[:40]!r} is no joint of the hand; leave it out, or mend it: {unknown}"
+            )
     angles, grasps = np.empty((len(rows) - 1, len(joints))), []
     for i, row in enumerate(rows[1:]):
         if len(row) != len(names):

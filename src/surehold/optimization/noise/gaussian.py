@@ -11,6 +11,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.kinds import Root, root_of
 from surehold.optimization.noise.quadratures import Quadrature, quadrature
+from surehold.optimization.values import LARGEST_SQUARED
 
 __all__ = ["Correlated", "Independent", "ShareOfBox", "checked_covariance", "checked_deviations", "in_order"]
 
@@ -104,8 +105,11 @@ def checked_deviation(name: str, value: float) -> float:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         number = np.nan
-    if not 0.0 <= number <= 1e150:  # its square stays finite
-        raise InputError(f"input noise of {name} is {value!r}; a standard deviation is a finite number of 0 or more.")
+    if not 0.0 <= number <= LARGEST_SQUARED:
+        raise InputError(
+            f"input noise of {name} is {value!r}; a standard deviation is a finite number of 0 or more, up to "
+            f"{LARGEST_SQUARED:g}."
+        )
     return number
 
 

@@ -83,13 +83,20 @@ def checked_samples(samples: ArrayLike, what: str = "samples of input noise") ->
     except (TypeError, ValueError):
         raise InputError(f"{what} are no numbers; give an array (N, d), one row a sample.") from None
     array = array[:, None] if array.ndim == 1 else array
-    if array.ndim != 2 or len(array) < _LEAST or array.shape[1] == 0:
-        raise InputError(f"{what} have shape {array.shape}; give two or more rows, (N, d), one column a variable.")
+    shape = InputError(f"{what} have shape {array.shape}; give two or more rows, (N, d), one column a variable.")
+    if array.ndim != 2 or array.size == 0:
+        raise shape
     if not np.isfinite(array).all():
         row = int(np.argmin(np.isfinite(array).all(axis=1)))
         raise InputError(f"{what} hold {array[row].tolist()} in row {row}; every one must be a finite number.")
+    if len(array) < _LEAST:
+        raise shape
     if np.all(array == array[0]):
-        raise InputError(f"{what} are all equal: an offset is no noise; give errors as they were measured.")
+        rows, columns = array.shape
+        raise InputError(
+            f"{what} are all equal, {rows} rows of {columns} column{'s' * (columns > 1)} for as many "
+            "variables: an offset is no noise; give errors as they were measured."
+        )
     array.flags.writeable = False
     return array
 

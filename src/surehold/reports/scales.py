@@ -1,0 +1,36 @@
+"""Axes in the own units of a variable: logarithmic where it is, whole numbers where it takes no other."""
+
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["set_scale"]
+
+_DECADE: Final = 10.0
+
+
+def set_scale(
+    axes: "Axes", which: Literal["x", "y"], limits: tuple[float, float], *, log: bool = False, whole: bool = False
+) -> None:
+    """Make one of two axes that of a variable: its limits, its scale and its ticks, in the units of the variable."""
+    from matplotlib.ticker import LogLocator, MaxNLocator
+
+    set_limits: Any = {"x": axes.set_xlim, "y": axes.set_ylim}[which]
+    if not log:
+        set_limits(limits)
+        if whole:
+            {"x": axes.xaxis, "y": axes.yaxis}[which].set_major_locator(
+                MaxNLocator("auto", integer=True, min_n_ticks=1)
+            )
+        return
+    {"x": axes.set_xscale, "y": axes.set_yscale}[which]("log")
+    set_limits(limits)
+    axis = {"x": axes.xaxis, "y": axes.yaxis}[which]
+    narrow = limits[1] / limits[0] <= _DECADE  # which may hold no power of ten, thus no number at all
+    if narrow:
+        axis.set_major_locator(MaxNLocator(4, integer=whole, min_n_ticks=1))
+    elif limits[1] / limits[0] <= _DECADE**3:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("")
