@@ -92,6 +92,8 @@ def test_not_callable():
         ("", "form name=lower:upper"),
         ("a=1", "form name=lower:upper"),
         ("a=0:one", "form name=lower:upper"),
+        ("f=0.1:10:log", "study create --parameters"),
+        ("grip=pinch|power", "study create --parameters"),
         ("a=0:1,a=0:2", "twice"),
         ("a=1:0", "smaller"),
         ("a=1:1", "smaller"),

@@ -127,9 +127,10 @@ def parse_bounds(text: str) -> Box:
                 raise ValueError
             pair = (float(lower), float(upper))
         except ValueError:
+            kinds = " For logarithmic, whole-number and choice variables use surehold study create --parameters."
             raise InputError(
                 f"bounds {part.strip()!r} are not of the form name=lower:upper; write for example "
-                "--bounds dx=-0.05:0.05,dy=0:1."
+                f"--bounds dx=-0.05:0.05,dy=0:1.{kinds * ('|' in span or span.count(':') > 1)}"
             ) from None
         if name in bounds:
             raise InputError(f"bounds name {name!r} twice; give each variable once.")

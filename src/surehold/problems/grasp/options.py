@@ -64,11 +64,14 @@ class GraspOption(NamedTuple):
     text: type | None = str  #: type on the command line; None for what a line of text cannot say
 
 
+_QUALITY_HELP: Final = f"One of {', '.join(QUALITIES)}. With all seven variables signed_epsilon finds better grasps."
+
+
 class GraspOptions(TypedDict, total=False):
     """The keyword options of a grasp problem; see `surehold.grasping.Simulator` for those of the simulator."""
 
     contact: Annotated[str, GraspOption("graded", "single, patch or graded (soft touch).", CONTACT_MODELS)]
-    quality: Annotated[str, GraspOption("epsilon", f"One of {', '.join(QUALITIES)}.", QUALITIES)]
+    quality: Annotated[str, GraspOption("epsilon", _QUALITY_HELP, QUALITIES)]
     friction: Annotated[
         float | None,
         GraspOption(None, "Coefficient of friction; by default the hand's or the object's own.", text=float),
