@@ -1,12 +1,12 @@
 """Where the next trial is made: of the initial design, then by the strategy, and where neither has a place left."""
 
 from collections.abc import Callable
-from itertools import islice
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import ROUNDED
 from surehold.optimization.assembly import Parts
 from surehold.optimization.box import Box
 from surehold.optimization.numerics.threads import computing
@@ -64,13 +64,15 @@ class Asking:
 
     def _place_in_design(self, trials: Trials, position: int, numbered: bool) -> int:
         made = trials.commanded if numbered else np.concatenate([trials.commanded, trials.pending])
-        design, made = self._controlled(self._snapped(self._parts.design)), self._controlled(made)
-
-        def unused(place: int) -> bool:  # on a lattice several places may be one point
-            return int(same(design[place], made).sum()) <= int(same(design[place], design[:place]).sum())
-
+        design = self._controlled(self._snapped(self._parts.design[: self._parts.n_initial]))
+        free = np.ones(len(design), dtype=bool)
+        for u in self._controlled(made):  # which may have been rounded
+            gaps = np.where(free, np.abs(design - u).max(axis=1), np.inf)
+            nearest = int(np.argmin(gaps))
+            free[nearest] &= gaps[nearest] > ROUNDED
         elsewhere = position - int(np.sum(trials.numbers < position)) if numbered else 0
-        return next(islice(filter(unused, range(self._parts.n_initial)), elsewhere, None), position)
+        left = np.flatnonzero(free)
+        return int(left[elsewhere]) if elsewhere < len(left) else position
 
     def _controlled(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return points (k, d) of the cube that differ in what is commanded alone."""

@@ -10,7 +10,6 @@ from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, Prior
 from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, correlation
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
-from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.protocol import mixture
 
 RADIAL = {
@@ -417,8 +416,3 @@ def test_draws_at_no_number_end_with_an_error():
     posterior = GaussianProcess().fit([[0.1], [0.5], [0.9]], [0.0, 1.0, 0.5]).posterior
     with pytest.raises(SureholdError, match="drawn"):
         posterior.sample(np.full((1, 2, 1), np.nan), np.zeros((1, 2)))
-
-
-def test_the_spread_of_tiny_outputs_that_do_not_differ_is_not_larger_than_they_are():
-    said = [Standardization.of(np.full(5, c)).scale for c in (5e-6, 0.5, 5.0, 0.0)]
-    assert said == [5e-6, 0.5, 1.0, 1.0]
