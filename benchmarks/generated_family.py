@@ -26,6 +26,7 @@ from threadpoolctl import threadpool_limits
 import surehold as sh
 from benchmarks.generated_landscapes import BUDGETS, NOISES, SHAPES, TEST, TRAINING, landscape
 from surehold.campaigns.peers import installed_peers
+from surehold.optimization.noise.kinds import root_of
 
 OURS = {
     "default": {},
@@ -35,6 +36,7 @@ OURS = {
     "local-global": {"surrogate": "local_global"},
     "gp": {"surrogate": "gp"},
 }
+TOLD = {"botorch-robust": "botorch"}  # peers told of the input noise
 GROUPS = {"1-2 variables": (1, 2), "3-4 variables": (3, 4), "5-6 variables": (5, 6), "7-8 variables": (7, 8)}
 
 
@@ -67,21 +69,31 @@ def run(seed, run_seed, method, budget_share=1.0):
 def _answers(problem, method, initial, budget, seed):
     """Return the answers after half and all of the trials."""
     waiting, answers, X, y = list(initial), [], [], []
+    settings = OURS.get(method)
     if method in OURS:
-        settings = OURS[method]
         noise = {} if settings is None else {"input_noise": problem.noise}
         optimizer = sh.Optimizer(problem.box, n_initial=len(initial), seed=seed, **noise, **(settings or {}))
-        observed = settings is None
     else:
-        optimizer, waiting, observed = installed_peers()[method](problem.dimension, initial, seed), [], True
+        told = {"root": _root(problem), "bounded": problem.noise.bounded} if method in TOLD else {}
+        maker = installed_peers()[TOLD.get(method, method)]
+        optimizer, waiting = maker(problem.dimension, initial, seed, **told), []
     for i in range(budget):
         u = np.clip(waiting.pop(0) if waiting else optimizer.ask(), 0.0, 1.0)
         X.append(u)
         y.append(problem(u))
         optimizer.tell(u, y[-1])
         if i + 1 in (budget // 2, budget):
-            answers.append(X[int(np.argmax(y))] if observed else optimizer.recommend().x)
+            if settings is not None:
+                answers.append(optimizer.recommend().x)
+            else:
+                answers.append(X[int(np.argmax(y))] if method in OURS else optimizer.answer())
     return answers
+
+
+def _root(problem):
+    """Return the root (d, d) of the noise's covariance; where it varies, of that in the middle of the box."""
+    middle = np.full(problem.dimension, 0.5)
+    return root_of(problem.noise.unit_covariance(problem.box, middle if problem.noise.varies else None))
 
 
 def summary(rows, reference=None):
@@ -133,7 +145,7 @@ def main():
     parser.add_argument("--count", type=int, default=20, help="problems")
     parser.add_argument("--runs", type=int, default=1, help="runs a problem")
     parser.add_argument("--classes", nargs="+", default=[], choices=(*SHAPES, *NOISES, *GROUPS))
-    parser.add_argument("--methods", nargs="+", default=list(OURS), choices=(*OURS, *installed_peers()))
+    parser.add_argument("--methods", nargs="+", default=list(OURS), choices=(*OURS, *installed_peers(), *TOLD))
     parser.add_argument("--budget", type=float, default=1.0, help="share of the usual number of trials")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", default="", help="file for the rows, as CSV")

@@ -89,19 +89,20 @@ def main():
     parser.add_argument("--first", type=int, default=0, help="first training seed")
     parser.add_argument("--count", type=int, default=40, help="training seeds looked at")
     parser.add_argument("--dimensions", type=int, nargs="+", default=[2, 3])
+    parser.add_argument("--seeds", type=int, nargs="+", help="just these, test seeds too; the others are not looked at")
     arguments = parser.parse_args()
     rows = []
-    print("seed  d  shape    noise        cause     half   full  tried  climb      z  promise  nearest")
-    for seed in TRAINING[arguments.first : arguments.first + arguments.count]:
+    print(" seed  d  shape    noise        cause     half   full  tried  climb      z  promise  nearest")
+    for seed in arguments.seeds or TRAINING[arguments.first : arguments.first + arguments.count]:
         problem = landscape(seed)
         slow = problem.kind == "varying" and problem.dimension > 2
-        if problem.dimension not in arguments.dimensions or slow:
+        if not arguments.seeds and (slow or problem.dimension not in arguments.dimensions):
             continue
         with threadpool_limits(1):
             row = traced(seed)
         rows.append(row)
         print(
-            f"{seed:4d} {row['d']:2d}  {row['shape']:8} {row['noise']:12} {row['cause']:7} {row['half']:6.2f} "
+            f"{seed:5d} {row['d']:2d}  {row['shape']:8} {row['noise']:12} {row['cause']:7} {row['half']:6.2f} "
             f"{row['full']:6.2f} {row['tried']:6.2f} {row['climb']:6.2f} {row['z']:6.1f} {row['promise']:8.2f} "
             f"{row['nearest']:8.2f}",
             flush=True,

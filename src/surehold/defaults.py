@@ -263,6 +263,9 @@ THESIS_REPEATS: Final = 2
 #: A rig rounds to its resolution: what is told within so many box widths, in every variable, of a pending trial is it.
 #: Never measured.
 ROUNDED: Final = 0.01
+#: Box widths, in some variable, between trials that are under way at the same time: robots at one place at one time
+#: learn one thing. Never measured.
+SEPARATION: Final = 1e-3
 #: Ranges of all other values by which an outlier lies below them. Wild readings of -30 and -100 among values of [0, 1]
 #: spoil no run of 20 with it; a smaller one would take true low values for outliers. Never measured otherwise.
 OUTLIER_DISTANCE: Final = 5.0

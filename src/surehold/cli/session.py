@@ -186,7 +186,7 @@ def run_session(
     if removed:
         more = ", ..." * (len(removed) > 3)
         console.print(
-            f"Removed what an earlier run had left there: {len(removed)} file{'s' * (len(removed) > 1)} "
+            f"Removed what an earlier run had left there: {amount(len(removed), 'file')} "
             f"({', '.join(removed[:3])}{more}).",
             markup=False,
             soft_wrap=True,

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from surehold.amounts import amount
 from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, say
 from surehold.errors import InputError
 
@@ -141,7 +142,7 @@ def import_trials(
         found = warm_start.trials_of_study(former, names, target.settings.direction, outputs)
     made = warm_start.import_trials(target, found, skip_bad=skip_bad)
     count = made.values + len(made.failed)
-    lines = [f"{count} trial{'s' * (count != 1)} imported into {name}"]
+    lines = [f"{amount(count, 'trial')} imported into {name}"]
     if count:
         lines[0] += f": {made.values} with a value"
     if made.failed:

@@ -5,7 +5,9 @@
 
 All six numbers are normal with standard deviation bound / 3, truncated at the bounds, ±10 mm and ±5 degrees by default:
 the disturbance under which grasp simulators commonly score robustness. Either the hand is disturbed in its own frame,
-or the object in the world. The draws depend on (n, seed) alone: grasps that are compared are shaken in the same way.
+or the object in the world. The draws are the first n of a scrambled Halton sequence of the seed: grasps that are
+compared are shaken in the same way, and the mean of 32 such trials is as exact as that of 100 independent ones
+(benchmarks/robust_quality_error.py).
 """
 
 from dataclasses import dataclass
@@ -26,6 +28,7 @@ Array = NDArray[np.float64]
 
 DISTURBED: Final = ("hand", "object")
 _TRUNCATION = 3.0  # standard deviations
+_TRIALS: Final = 32
 _MOST: Final = 1_000_000  # trials: hours
 
 
@@ -62,7 +65,7 @@ def robust_quality(
     s1: float | tuple[float, ...] = 0.0,
     *,
     noise: PoseNoise | None = None,
-    n: int = 100,
+    n: int = _TRIALS,
     seed: int = 0,
     disturbed: Literal["hand", "object"] = "hand",
     workers: int = 1,
@@ -110,7 +113,7 @@ def disturbed_poses(
     simulator: Simulator,
     pose: Pose,
     noise: PoseNoise | None = None,
-    n: int = 100,
+    n: int = _TRIALS,
     seed: int = 0,
     disturbed: Literal["hand", "object"] = "hand",
 ) -> Array:
@@ -120,6 +123,7 @@ def disturbed_poses(
     """
     from scipy.spatial.transform import Rotation
     from scipy.special import ndtr, ndtri
+    from scipy.stats import qmc
 
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= _MOST:
         raise InputError(f"number of disturbed trials is {n!r}; give an integer of 1 to {_MOST:,}.")
@@ -130,7 +134,7 @@ def disturbed_poses(
     bounds = noise or PoseNoise()
     if not all(np.isfinite(b) and b >= 0.0 for b in bounds):
         raise InputError(f"pose noise is {bounds}; give bounds of 0 or more, in meters and radians.")
-    share = np.random.default_rng(seed).random((int(n), 6))
+    share = qmc.Halton(6, rng=seed).random(int(n))
     low = ndtr(-_TRUNCATION)
     draws = ndtri(low + share * (1.0 - 2.0 * low)) / _TRUNCATION  # in [-1, 1]
     shifts, turns = bounds.shift * draws[:, :3], bounds.turn * draws[:, 3:]

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import ROUNDED
+from surehold.defaults import ROUNDED, SEPARATION
 from surehold.optimization.assembly import Parts
 from surehold.optimization.box import Box
 from surehold.optimization.numerics.threads import computing
@@ -16,8 +16,6 @@ from surehold.optimization.surrogates.protocol import Posterior
 from surehold.optimization.trials import Trials, same
 
 __all__ = ["Asking", "history_of"]
-
-_APART: Final = 1e-3  # box widths between trials under way: robots at one place at one time learn one thing
 
 
 def history_of(trials: Trials, requirements: Requirements | None, values: NDArray[np.float64]) -> History:
@@ -63,16 +61,16 @@ class Asking:
         return self._box.uncontrolled.at_mean(u) if self._measured and self._box.uncontrolled is not None else u
 
     def _place_in_design(self, trials: Trials, position: int, numbered: bool) -> int:
+        """Return which place of the design is asked for, see `place`; the position where none is left."""
         made = trials.commanded if numbered else np.concatenate([trials.commanded, trials.pending])
         design = self._controlled(self._snapped(self._parts.design[: self._parts.n_initial]))
-        free = np.ones(len(design), dtype=bool)
-        for u in self._controlled(made):  # which may have been rounded
-            gaps = np.where(free, np.abs(design - u).max(axis=1), np.inf)
-            nearest = int(np.argmin(gaps))
-            free[nearest] &= gaps[nearest] > ROUNDED
+        left = list(range(len(design)))
+        for u in self._controlled(made):  # which may have been rounded; most are in the order of the design
+            at = next((k for k, place in enumerate(left) if np.abs(design[place] - u).max() <= ROUNDED), None)
+            if at is not None:
+                del left[at]
         elsewhere = position - int(np.sum(trials.numbers < position)) if numbered else 0
-        left = np.flatnonzero(free)
-        return int(left[elsewhere]) if elsewhere < len(left) else position
+        return left[elsewhere] if elsewhere < len(left) else position
 
     def _controlled(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return points (k, d) of the cube that differ in what is commanded alone."""
@@ -92,16 +90,14 @@ class Asking:
         candidates = self._snapped(candidates)
         if history.admission is not None:
             candidates = candidates[history.admission.possible(candidates)]
-        apart = [candidate for candidate in candidates if not self._beside_pending(candidate, trials)]
+        gaps = np.abs(candidates[:, None] - trials.pending).max(axis=2)
+        apart = candidates[np.all(gaps >= SEPARATION, axis=1)]
         if strategy.ranking.noisy and len(candidates):
-            return (apart or candidates)[0]
+            return (apart if len(apart) else candidates)[0]
         for candidate in apart:
             if np.count_nonzero(same(candidate, trials.commanded)) <= strategy.repeats:
                 return candidate
         return self._anywhere(trials, rng)  # every candidate has been tried already
-
-    def _beside_pending(self, u: NDArray[np.float64], trials: Trials) -> bool:
-        return bool(len(trials.pending) and np.abs(trials.pending - u).max(axis=1).min() < _APART)
 
     def _anywhere(self, trials: Trials, rng: np.random.Generator) -> NDArray[np.float64]:
         if self._parts.requirements is not None:

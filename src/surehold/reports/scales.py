@@ -1,6 +1,6 @@
 """Axes in the own units of a variable: logarithmic where it is, whole numbers where it takes no other."""
 
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,17 +16,13 @@ def set_scale(
     """Make one of two axes that of a variable: its limits, its scale and its ticks, in the units of the variable."""
     from matplotlib.ticker import LogLocator, MaxNLocator
 
-    set_limits: Any = {"x": axes.set_xlim, "y": axes.set_ylim}[which]
-    if not log:
-        set_limits(limits)
-        if whole:
-            {"x": axes.xaxis, "y": axes.yaxis}[which].set_major_locator(
-                MaxNLocator("auto", integer=True, min_n_ticks=1)
-            )
-        return
-    {"x": axes.set_xscale, "y": axes.set_yscale}[which]("log")
-    set_limits(limits)
     axis = {"x": axes.xaxis, "y": axes.yaxis}[which]
+    axes.set(**{f"{which}scale": "log" if log else "linear"})
+    axes.set(**{f"{which}lim": limits})
+    if not log:
+        if whole:
+            axis.set_major_locator(MaxNLocator("auto", integer=True, min_n_ticks=1))
+        return
     narrow = limits[1] / limits[0] <= _DECADE  # which may hold no power of ten, thus no number at all
     if narrow:
         axis.set_major_locator(MaxNLocator(4, integer=whole, min_n_ticks=1))

@@ -7,7 +7,7 @@ wrench are in units of force. H is the convex hull of the contacts' wrenches, h(
 | name             | formula                                          | unit    | range    | 0 means
 |------------------|--------------------------------------------------|---------|----------|------------------------
 | `epsilon`        | max(0, min over unit u of h(u))                  | force   | >= 0     | some wrench not resisted
-| `signed_epsilon` | the same; outside - c log(1 + d / c)              | force   | any      | on the border of closure
+| `signed_epsilon` | the same; outside - c log(1 + d / c)             | force   | any      | on the border of closure
 | `volume`         | volume of H in six dimensions, 0 without closure | force^6 | >= 0     | some wrench not resisted
 | `simox`          | as the simulator of the thesis, see simox.py     | none    | >= 0     | fewer than 2 contacts
 | `task`           | min over t of the largest s with -s t in H       | none    | >= 0     | some t not resisted
@@ -45,7 +45,7 @@ from surehold.grasping.wrench.friction_cones import CONVENTIONS, Convention, fin
 from surehold.grasping.wrench.simox import ObjectWrenchSpace, object_wrench_space, simox_quality
 from surehold.grasping.wrench.wrench_space import WrenchQuality, wrench_quality
 
-__all__ = ["GRAVITY_DIRECTIONS", "Measure"]
+__all__ = ["GRAVITY_DIRECTIONS", "OUTSIDE", "Measure"]
 
 Array = NDArray[np.float64]
 
@@ -54,14 +54,13 @@ _SIGNS = np.array([s for s in product((-1.0, 0.0, 1.0), repeat=3) if abs(s[0]) +
 #: Towards the faces and the corners of a cube, (14, 3).
 GRAVITY_DIRECTIONS: Final = _SIGNS / np.linalg.norm(_SIGNS, axis=1)[:, None]
 
-_OUTSIDE: Final = (
-    0.05  # distance [force] at which the slope outside is half of that inside: the epsilon of a good grasp
-)
+#: Distance [force] at which the slope outside is half of that inside: the epsilon of a good grasp.
+OUTSIDE: Final = 0.05
 
 
 def _lacking(distance: float) -> float:
     """Return what `signed_epsilon` is at a distance >= 0 from closure, both in units of force."""
-    return -_OUTSIDE * float(np.log1p(distance / _OUTSIDE))
+    return -OUTSIDE * float(np.log1p(distance / OUTSIDE))
 
 
 @dataclass(frozen=True, eq=False)

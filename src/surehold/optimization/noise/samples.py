@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.amounts import amount
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.kinds import Root
@@ -94,7 +95,7 @@ def checked_samples(samples: ArrayLike, what: str = "samples of input noise") ->
     if np.all(array == array[0]):
         rows, columns = array.shape
         raise InputError(
-            f"{what} are all equal, {rows} rows of {columns} column{'s' * (columns > 1)} for as many "
+            f"{what} are all equal, {rows} rows of {amount(columns, 'column')} for as many "
             "variables: an offset is no noise; give errors as they were measured."
         )
     array.flags.writeable = False
