@@ -1,10 +1,11 @@
 """What grasps are worth when the hand strays: `python -m benchmarks.robust_grasps --rows grasps.jsonl --seeds 10`.
 
 Mug and bottle, in the two position offsets (100 trials, 40 of them initial) and in all seven variables (150 trials, 30
-of them initial), with input noise of 3 % of the box in every variable. Trials reach what is commanded. Plain
-optimization answers with its highest observed trial, the others with their recommendation; every answer is queried
-1,000 times more, the same perturbations for all of them, and none of these is part of the budget. Every finished run is
-a line of the rows' file: a benchmark that is stopped goes on where it was (give another file for another program).
+of them initial), with input noise of 3 % of the box in every variable. Trials reach what is commanded and give the
+default quality. Plain optimization answers with its highest observed trial, the others with their recommendation; every
+answer is queried 1,000 times more and rated by epsilon, the same perturbations for all of them, and none of these is
+part of the budget. Every finished run is a line of the rows' file: a benchmark that is stopped goes on where it was
+(give another file for another program).
 
 Printed are means over seeds with standard errors: of the re-queries' mean, lowest value, standard deviation and the
 mean of their worst tenth; the difference of the means from "robust", paired on common seeds; and CPU seconds a run.
@@ -41,8 +42,8 @@ TAIL = 0.1
 SCORES = ("mean", "worst", "std", "tenth")
 
 
-def run(problem, n_trials, n_initial, seed, settings):
-    """Return the row of one run: the answer (d,) and what its re-queries gave."""
+def run(problem, rated, n_trials, n_initial, seed, settings):
+    """Return the row of one run: the answer (d,) and what its re-queries of `rated` gave."""
     started = time.process_time()
     optimizer = sh.Optimizer(problem.box, n_initial=n_initial, seed=seed, **settings)
     for _ in range(n_trials):
@@ -50,7 +51,7 @@ def run(problem, n_trials, n_initial, seed, settings):
         optimizer.tell(x, problem(x))
     x = optimizer.recommend().x if settings else optimizer.X[int(np.argmax(optimizer.y))]
     seconds = time.process_time() - started
-    score = sh.problems.robust_score(problem, x, NOISE, n=REQUERIES, seed=12345)
+    score = sh.problems.robust_score(rated, x, NOISE, n=REQUERIES, seed=12345)
     if score.n_failed:
         raise RuntimeError(f"{score.n_failed} re-queries of {x.tolist()} failed")
     return {
@@ -103,16 +104,18 @@ def main():
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS))
     arguments = parser.parse_args()
     rows, source = finished(arguments.rows), versions()["source"]
-    built = {
-        name: sh.problems.GraspProblem(PROBLEMS[name][0], variables=PROBLEMS[name][1]) for name in arguments.problems
-    }
+    built = {}
+    for name in arguments.problems:
+        obj, variables, *_ = PROBLEMS[name]
+        told, rated = (sh.problems.GraspProblem(obj, variables=variables, quality=q) for q in ("", "epsilon"))
+        built[name] = told, rated
     for seed in range(arguments.seeds):
-        for name, problem in built.items():
+        for name, (problem, rated) in built.items():
             for method in arguments.methods:
                 if (name, method, seed) in rows:
                     continue
                 with threadpool_limits(1):
-                    made = run(problem, *PROBLEMS[name][2:], seed, METHODS[method])
+                    made = run(problem, rated, *PROBLEMS[name][2:], seed, METHODS[method])
                 row = {"problem": name, "method": method, "seed": seed, **made, "source": source}
                 rows[name, method, seed] = row
                 with arguments.rows.open("a") as file:

@@ -125,13 +125,14 @@ def grasp(
     from surehold.grasping.formats.writing import checked_formats
     from surehold.grasping.plain_data import grasp_to_dict
     from surehold.problems.grasp.description import described_grasp
+    from surehold.problems.grasp.options import checked_words
     from surehold.reports.run_report import Candidate, RunReport
     from surehold.reports.still import still_picture
     from surehold.store.atomic import write_file
 
     chosen = checked_formats(formats.split(","))
     names = [name.strip() for name in options["variables"].split(",") if name.strip()]
-    described = {"object": obj, **options, "variables": names, "preset": simulator_preset(preset)}
+    described = checked_words({"object": obj, **options, "variables": names, "preset": simulator_preset(preset)})
     kept = Kept(study, storage, {"grasp": described})
     console = terminal()
     body = object_of(described, console)

@@ -25,6 +25,7 @@ __all__ = [
     "GraspOption",
     "GraspOptions",
     "checked_words",
+    "default_quality",
 ]
 
 #: All variables of a grasp, and their units.
@@ -64,14 +65,20 @@ class GraspOption(NamedTuple):
     text: type | None = str  #: type on the command line; None for what a line of text cannot say
 
 
-_QUALITY_HELP: Final = f"One of {', '.join(QUALITIES)}. With all seven variables signed_epsilon finds better grasps."
+#: Free variables up to which a random pose often holds, so that epsilon, which is 0 elsewhere, tells a search enough.
+#: Compared with two and with seven (benchmarks/signed_quality.py): no difference, and better answers with the slope.
+_FEW: Final = 3
+_QUALITY_HELP: Final = (
+    f"One of {', '.join(QUALITIES)}; by default epsilon, with more than {_FEW} variables signed_epsilon, which tells a "
+    "search where to go."
+)
 
 
 class GraspOptions(TypedDict, total=False):
     """The keyword options of a grasp problem; see `surehold.grasping.Simulator` for those of the simulator."""
 
     contact: Annotated[str, GraspOption("graded", "single, patch or graded (soft touch).", CONTACT_MODELS)]
-    quality: Annotated[str, GraspOption("epsilon", _QUALITY_HELP, QUALITIES)]
+    quality: Annotated[str, GraspOption("", _QUALITY_HELP, ("", *QUALITIES))]
     friction: Annotated[
         float | None,
         GraspOption(None, "Coefficient of friction; by default the hand's or the object's own.", text=float),
@@ -159,6 +166,14 @@ OPTIONS: Final[Mapping[str, GraspOption]] = {
 }
 
 
+def default_quality(variables: Sequence[str], preset: str) -> str:
+    """Return the quality where none is named; `variables` as a list, or as a command line has them, with commas."""
+    if preset:
+        return THESIS_SIMULATOR["quality"]
+    names = variables.split(",") if isinstance(variables, str) else variables
+    return "signed_epsilon" if len(names) > _FEW else "epsilon"
+
+
 def checked_words(words: Mapping[str, Any], what: str = "option of a grasp") -> dict[str, Any]:
     """Return a description with the defaults of what it leaves open.
 
@@ -171,4 +186,5 @@ def checked_words(words: Mapping[str, Any], what: str = "option of a grasp") -> 
     for name in named:
         if name not in OPTIONS:
             raise unknown_name(what, name, OPTIONS)
-    return {name: option.default for name, option in OPTIONS.items()} | named
+    given: dict[str, Any] = {name: option.default for name, option in OPTIONS.items()} | named
+    return given | {"quality": given["quality"] or default_quality(given["variables"], given["preset"])}

@@ -27,7 +27,15 @@ from surehold.grasping.poses import Pose, default_pose, facet_axes
 from surehold.grasping.simulator import Simulator
 from surehold.optimization.box import Box
 from surehold.problems.grasp.default_poses import GraspDefault, default_facet, grasp_default
-from surehold.problems.grasp.options import AMPLITUDES, OPTIONS, PLANS, THESIS_SIMULATOR, VARIABLES, GraspOptions
+from surehold.problems.grasp.options import (
+    AMPLITUDES,
+    OPTIONS,
+    PLANS,
+    THESIS_SIMULATOR,
+    VARIABLES,
+    GraspOptions,
+    default_quality,
+)
 from surehold.problems.problem import checked_points
 
 __all__ = ["GraspProblem"]
@@ -49,7 +57,8 @@ class GraspProblem:
     variables
         Names of the free variables, a subset of `VARIABLES`; their order is the order of the coordinates.
     contact, quality, closing, friction, torsion, cones, task, collision, hand, preshape
-        As in `surehold.grasping.Simulator`; these and the following are described in options.py.
+        As in `surehold.grasping.Simulator`; these and the following are described in options.py. The quality is by
+        default "epsilon", and "signed_epsilon" with more than three variables, where few poses hold.
     plan
         What a grasp of an object that has `draws` is worth: "shapes" (default): the mean over the draws; "mean": that
         on the object itself, the mean shape.
@@ -126,6 +135,7 @@ class GraspProblem:
         self._on_shapes: Final[bool] = given.pop("plan") == "shapes"
         self._settings: dict[str, Any] = given | (THESIS_SIMULATOR if preset else {})
         self._settings["preshape"] = given["preshape"] or None
+        self._settings["quality"] = self._settings["quality"] or default_quality(names, preset)
         self._simulator: Simulator | None = None
         self._others: tuple[Simulator, ...] | None = None
         self._simulator = self._build()

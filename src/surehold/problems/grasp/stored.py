@@ -35,7 +35,8 @@ class DescribedFile(NamedTuple):
 def stored_words(words: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a file of grasps keeps of a `DescribedGrasp`: what has its default is left out."""
     given = checked_words(words) | (THESIS_SIMULATOR if words.get("preset") else {})
-    kept = {name: given[name] for name in _KEPT if given[name] != OPTIONS[name].default}
+    usual = checked_words({})
+    kept = {name: given[name] for name in _KEPT if given[name] != usual[name]}
     if given["cloud"]:  # the file has its mean shape beside it, in meters
         return {name: value for name, value in kept.items() if name not in ("object", "unit", "frame")}
     return {"object": given["object"]} | kept
