@@ -132,7 +132,8 @@ def grasp(
 
     chosen = checked_formats(formats.split(","))
     names = [name.strip() for name in options["variables"].split(",") if name.strip()]
-    described = checked_words({"object": obj, **options, "variables": names, "preset": simulator_preset(preset)})
+    described = {"object": obj, **options, "variables": names, "preset": simulator_preset(preset)}
+    described["quality"] = checked_words(described)["quality"]
     kept = Kept(study, storage, {"grasp": described})
     console = terminal()
     body = object_of(described, console)
