@@ -19,6 +19,7 @@ import numpy as np
 import surehold as sh
 
 OBJECTS = ("mug", "bottle", "glass", "drill")
+SEVEN = ("dx", "dy", "dz", "rx", "ry", "rz", "s1")
 
 #: name of a run -> (problem, trials, settings of the optimizer)
 RUNS: Mapping[str, tuple[str, int, dict[str, Any]]] = {
@@ -88,9 +89,7 @@ def grasps(each: int = 12) -> Iterator[tuple[str, list[float]]]:
     for o, obj in enumerate(OBJECTS):
         for k, options in enumerate(GRASP_OPTIONS):
             facet = FACETS[(o + k) % len(FACETS)]
-            problem = sh.problems.GraspProblem(
-                obj, facet=facet, variables=("dx", "dy", "dz", "rx", "ry", "rz", "s1"), **options
-            )
+            problem = sh.problems.GraspProblem(obj, facet=facet, variables=SEVEN, **{"quality": "epsilon", **options})
             rng = np.random.default_rng([o, k])
             for i in range(each):
                 x = problem.box.from_unit(0.5 + 0.35 * (rng.random(7) - 0.5))

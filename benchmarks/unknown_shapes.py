@@ -261,7 +261,7 @@ def explored(objects, args):
             key = {"object": name, "seed": seed}
             if not known(args, key):
                 belief = belief_of_box(obj)
-                yield key, GraspProblem(belief.mean_object(), variables=SEVEN), belief
+                yield key, GraspProblem(belief.mean_object(), variables=SEVEN, quality="epsilon"), belief
 
 
 def worth(real, x):
@@ -271,7 +271,7 @@ def worth(real, x):
 def timed(objects, args):
     for name, obj in objects.items():
         belief = belief_of_box(obj)
-        problem = GraspProblem(belief.mean_object(), variables=SEVEN)
+        problem = GraspProblem(belief.mean_object(), variables=SEVEN, quality="epsilon")
         real, run = problem.on(obj), Exploration(problem, belief, NOISE, seed=args.first)
         while len(run.belief.surface.observations.slopes) < 200:
             x = run.ask()
