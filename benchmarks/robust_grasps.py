@@ -9,6 +9,11 @@ part of the budget. Every finished run is a line of the rows' file: a benchmark 
 
 Printed are means over seeds with standard errors: of the re-queries' mean, lowest value, standard deviation and the
 mean of their worst tenth; the difference of the means from "robust", paired on common seeds; and CPU seconds a run.
+
+With `--trace` the three lowest runs of "robust" on each problem are made again. Printed are the answer's mean, that of
+the best trial (of the fifteen highest, and of the fifteen that the model believes best), and what the model says at the
+answer of the best run: the truth, by how many standard deviations the model lies below it, and how far the nearest
+trial is away, in box widths, as the largest difference in one variable.
 """
 
 import argparse
@@ -42,13 +47,19 @@ TAIL = 0.1
 SCORES = ("mean", "worst", "std", "tenth")
 
 
-def run(problem, rated, n_trials, n_initial, seed, settings):
-    """Return the row of one run: the answer (d,) and what its re-queries of `rated` gave."""
-    started = time.process_time()
+def searched(problem, n_trials, n_initial, seed, settings):
+    """Return the optimizer after all trials."""
     optimizer = sh.Optimizer(problem.box, n_initial=n_initial, seed=seed, **settings)
     for _ in range(n_trials):
         x = optimizer.ask()
         optimizer.tell(x, problem(x))
+    return optimizer
+
+
+def run(problem, rated, n_trials, n_initial, seed, settings):
+    """Return the row of one run: the answer (d,) and what its re-queries of `rated` gave."""
+    started = time.process_time()
+    optimizer = searched(problem, n_trials, n_initial, seed, settings)
     x = optimizer.recommend().x if settings else optimizer.X[int(np.argmax(optimizer.y))]
     seconds = time.process_time() - started
     score = sh.problems.robust_score(rated, x, NOISE, n=REQUERIES, seed=12345)
@@ -96,12 +107,37 @@ def report(rows, problems, methods):
             print(f"{name:11} {method:12} {len(own):5d} {''.join(f'{cell:>17}' for cell in cells)}  {seconds:5.1f}")
 
 
+def trace(problem, rated, n_trials, n_initial, rows):
+    """Print why the three lowest of the rows (those of "robust" on a problem) are low."""
+
+    def worth(of, x):
+        return sh.problems.robust_score(of, x, NOISE, n=300, seed=7).mean
+
+    low, high = sorted(rows, key=lambda row: row["mean"])[:3], max(rows, key=lambda row: row["mean"])
+    best = np.array(high["x"])
+    truth = worth(problem, best)
+    for row in low:
+        optimizer = searched(problem, n_trials, n_initial, row["seed"], METHODS["robust"])
+        believed = optimizer.predict(optimizer.X, under_noise=True)[0]
+        tops = {*np.argsort(-optimizer.y)[:15].tolist(), *np.argsort(-believed)[:15].tolist()}
+        tried = max(worth(rated, optimizer.X[i]) for i in tops)
+        mean, std = optimizer.predict(best[None], under_noise=True)
+        gaps = np.abs(problem.box.to_unit(optimizer.X) - problem.box.to_unit(best)).max(axis=1)
+        print(
+            f"seed {row['seed']}: answer {row['mean']:.3f}, best trial {tried:.3f}; at the answer of seed "
+            f"{high['seed']} {truth:.3f}, {(truth - mean[0]) / std[0]:.1f} deviations above the model, nearest trial "
+            f"{gaps.min():.2f} away",
+            flush=True,
+        )
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rows", type=Path, required=True, help="file of finished runs; made or continued")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--problems", nargs="+", default=list(PROBLEMS), choices=list(PROBLEMS))
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS))
+    parser.add_argument("--trace", action="store_true", help="say why the lowest runs are low")
     arguments = parser.parse_args()
     rows, source = finished(arguments.rows), versions()["source"]
     built = {}
@@ -121,6 +157,14 @@ def main():
                 with arguments.rows.open("a") as file:
                     file.write(json.dumps(row) + "\n")
     report(rows, arguments.problems, arguments.methods)
+    for name in arguments.problems if arguments.trace else ():
+        print(name)
+        with threadpool_limits(1):
+            trace(
+                *built[name],
+                *PROBLEMS[name][2:],
+                [row for (p, m, _), row in rows.items() if (p, m) == (name, "robust")],
+            )
 
 
 if __name__ == "__main__":
