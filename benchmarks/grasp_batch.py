@@ -2,7 +2,7 @@
 
 Poses are those of a Latin hypercube over dx and dy from which the hand starts free, tried by one process and by two;
 wall time without the start of the processes. Then the quality of the middle one of the closed grasps under the default
-noise of the pose, in one process and in two, with the default number of trials, whose mean is as exact as that of 100
+noise of the pose, in one process and in two, with the default number of trials, whose mean is as exact as that of 72
 independent ones (`benchmarks.robust_quality_error`).
 """
 

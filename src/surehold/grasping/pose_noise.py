@@ -6,7 +6,7 @@
 All six numbers are normal with standard deviation bound / 3, truncated at the bounds, ±10 mm and ±5 degrees by default:
 the disturbance under which grasp simulators commonly score robustness. Either the hand is disturbed in its own frame,
 or the object in the world. The draws are the first n of a scrambled Halton sequence of the seed: grasps that are
-compared are shaken in the same way, and the mean of 32 such trials is as exact as that of 100 independent ones
+compared are shaken in the same way, and the mean of 24 such trials is as exact as that of 72 independent ones
 (benchmarks/robust_quality_error.py).
 """
 
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 DISTURBED: Final = ("hand", "object")
 _TRUNCATION = 3.0  # standard deviations
-_TRIALS: Final = 32
+_TRIALS: Final = 24
 _MOST: Final = 1_000_000  # trials: hours
 
 
