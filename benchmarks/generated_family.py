@@ -69,24 +69,23 @@ def run(seed, run_seed, method, budget_share=1.0):
 def _answers(problem, method, initial, budget, seed):
     """Return the answers after half and all of the trials."""
     waiting, answers, X, y = list(initial), [], [], []
-    settings = OURS.get(method)
     if method in OURS:
+        settings = OURS[method]
         noise = {} if settings is None else {"input_noise": problem.noise}
         optimizer = sh.Optimizer(problem.box, n_initial=len(initial), seed=seed, **noise, **(settings or {}))
+        answer = (lambda: X[int(np.argmax(y))]) if settings is None else (lambda: optimizer.recommend().x)
     else:
         told = {"root": _root(problem), "bounded": problem.noise.bounded} if method in TOLD else {}
         maker = installed_peers()[TOLD.get(method, method)]
         optimizer, waiting = maker(problem.dimension, initial, seed, **told), []
+        answer = optimizer.answer
     for i in range(budget):
         u = np.clip(waiting.pop(0) if waiting else optimizer.ask(), 0.0, 1.0)
         X.append(u)
         y.append(problem(u))
         optimizer.tell(u, y[-1])
         if i + 1 in (budget // 2, budget):
-            if settings is not None:
-                answers.append(optimizer.recommend().x)
-            else:
-                answers.append(X[int(np.argmax(y))] if method in OURS else optimizer.answer())
+            answers.append(answer())
     return answers
 
 

@@ -51,6 +51,11 @@ def test_a_facet_has_four_modes_and_the_best_comes_first(here, capsys):
     assert (here / "seen" / "scene.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_scene_is_a_grid_over_two_offsets_whatever_the_command_line_says(here, capsys):
+    assert surehold("scene bottle --variables dx,dy,dz,rx") == 2
+    assert "--variables" in capsys.readouterr().err
+
+
 def test_a_mesh_and_a_hand_of_ones_own(here, capsys):
     line = "grasp block.stl --unit mm --mass 0.2 --hand gripper.xml --hand-config gripper.yaml"
     assert surehold(f"{line} --trials 14 --initial 10 --noise 0.02 --out held") == 0

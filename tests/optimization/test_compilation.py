@@ -32,9 +32,13 @@ print(imported, Compiled.names)
 
 
 def _compiled_here(settings, folder, **environment):
+    return _said_by(RUN.format(settings=settings), folder, **environment)
+
+
+def _said_by(program, folder, **environment):
     here = {key: value for key, value in os.environ.items() if key != "SUREHOLD_WARM_UP"} | environment
     done = subprocess.run(
-        [sys.executable, "-c", RUN.format(settings=settings)],
+        [sys.executable, "-c", program],
         env=here | ({"NUMBA_CACHE_DIR": str(folder)} if folder else {}),
         capture_output=True,
         text=True,
@@ -48,6 +52,24 @@ def _compiled_here(settings, folder, **environment):
 @pytest.mark.parametrize("settings", ["{}", "{'input_noise': sh.InputNoise.unit(0.1), 'surrogate': 'tgp'}"])
 def test_a_child_compiles_everything_that_a_run_needs(settings, tmp_path):
     assert _compiled_here(settings, tmp_path) == "0 []"
+
+
+NOW = """
+import surehold as sh
+from surehold.optimization.compilation import compile_now
+from surehold.store import background
+settings = {settings}
+compile_now(settings)
+begun = [*background._children, *background._elsewhere]
+background._seen.clear()
+sh.Optimizer(sh.Box.unit(2), **settings)
+print(begun, background._children, background._elsewhere)
+"""
+
+
+@pytest.mark.parametrize("settings", ["{'input_noise': sh.InputNoise.unit(0.1)}", "{'outcome': 'success'}"])
+def test_what_is_compiled_now_starts_no_child_neither_then_nor_afterwards(settings, tmp_path):
+    assert _said_by(NOW.format(settings=settings), tmp_path) == "[] [] []"
 
 
 def test_without_a_child_the_run_compiles(tmp_path):

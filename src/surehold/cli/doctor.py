@@ -69,7 +69,8 @@ def _warm() -> None:
 
     console = terminal()
     noise = InputNoise.unit(0.05)
-    paths: list[dict[str, Any]] = [{"surrogate": name} for name in SURROGATES]
+    paths: list[dict[str, Any]] = [{}, {"input_noise": noise}]
+    paths += [{"surrogate": name} for name in SURROGATES]
     paths += [{"surrogate": name, "input_noise": noise} for name in SURROGATES]
     paths += [
         {"noise": "inferred"},
@@ -81,9 +82,9 @@ def _warm() -> None:
         *({"outcome": "success", "surrogate": name, "input_noise": noise} for name in SUCCESS_SURROGATES),
     ]
     for number, path in enumerate(paths):
-        console.print(f"Compiling {number + 1} of {len(paths)}: {', '.join(map(str, path.values()))}", markup=False)
-        # As an optimizer is given them, with every default.
-        compile_now({"surrogate": "gp", "risk": "mean", "noise_while_exploring": False, "trust_region": False} | path)
+        named = ", ".join(map(str, path.values())) or "the defaults"
+        console.print(f"Compiling {number + 1} of {len(paths)}: {named}", markup=False)
+        compile_now(path)
     if not missing("grasp"):
         from surehold.grasping import CONTACT_MODELS
         from surehold.problems import GraspProblem

@@ -2,6 +2,7 @@
 
 import json
 import webbrowser
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,7 +19,7 @@ _COLUMNS = ("object", "mode", "standoff [mm]", "s1", "dx, dy [mm]", "status", "q
 _ALONG, _ACROSS = 9, 5  # grasps that are tried in a mode
 
 
-@takes_grasp_options
+@partial(takes_grasp_options, without=("variables",))
 def scene(
     obj: Annotated[
         str, typer.Argument(metavar="[OBJECT]", help="mug, bottle, glass, drill, or a mesh file; all four by default.")
@@ -57,7 +58,7 @@ def scene(
     best = -np.inf
     picture = None
     for name in [obj] if obj else OBJECTS:
-        described = {**words, "object": name, "variables": ("dx", "dy")}
+        described = {**words, "object": name}
         body = object_of(described, console)
         for mode in _modes(facet or ("all" if quick else default_facet(body))):
             with announced(console), shown_progress(f"{body.name}, {mode}", console) as progress:

@@ -9,6 +9,7 @@ import pickle
 import sys
 from collections.abc import Mapping
 from hashlib import sha256
+from inspect import signature
 from typing import Any, Final
 
 from surehold.optimization.noise.input_noise import InputNoise
@@ -53,8 +54,13 @@ def compile_ahead(settings: Mapping[str, Any]) -> None:
 
 
 def compile_now(settings: Mapping[str, Any]) -> None:
-    """Make a short run with these arguments, at whose end the cache holds the kernels, and note that in the cache."""
-    told = essentials(settings)
+    """Make a short run with these arguments, at whose end the cache holds the kernels, and note that in the cache.
+
+    What they leave open has the default of `Optimizer`: what is noted is what an optimizer will look for.
+    """
+    from surehold.optimization.optimizer import Optimizer
+
+    told = essentials({name: one.default for name, one in signature(Optimizer).parameters.items()} | dict(settings))
     _compile(_key(told), told)
 
 

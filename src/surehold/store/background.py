@@ -112,7 +112,11 @@ def wait() -> None:
 
 @contextmanager
 def marking(marker: Path) -> Iterator[bool]:
-    """Hold the marker's lock during the block and write the marker at its end; gives whether there is none yet."""
+    """Hold the marker's lock during the block and write the marker at its end; gives whether there is none yet.
+
+    What the block itself begins is not that: it would wait for this process.
+    """
+    _seen.add(marker)
     with file_lock(_lock(marker)):
         yield not marker.exists()
         with suppress(OSError):  # a full disk: the kernels are compiled again

@@ -21,7 +21,6 @@ SEVEN = tuple(VARIABLES)
 def test_the_quality_is_signed_where_few_poses_hold_and_none_is_named(variables, options, quality):
     assert GraspProblem("bottle", variables=variables, **options).simulator.quality == quality
     assert checked_words({"variables": variables, **options})["quality"] == quality
-    assert checked_words({"variables": ",".join(variables), **options})["quality"] == quality
 
 
 def test_a_file_of_grasps_keeps_the_quality_that_it_was_planned_with():

@@ -167,11 +167,10 @@ OPTIONS: Final[Mapping[str, GraspOption]] = {
 
 
 def default_quality(variables: Sequence[str], preset: str) -> str:
-    """Return the quality where none is named; `variables` as a list, or as a command line has them, with commas."""
+    """Return the quality where none is named."""
     if preset:
         return THESIS_SIMULATOR["quality"]
-    names = variables.split(",") if isinstance(variables, str) else variables
-    return "signed_epsilon" if len(names) > _FEW else "epsilon"
+    return "signed_epsilon" if len(variables) > _FEW else "epsilon"
 
 
 def checked_words(words: Mapping[str, Any], what: str = "option of a grasp") -> dict[str, Any]:
