@@ -15,25 +15,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.campaigns.botorch_methods import BoTorch, BoTorchTrustRegion
+from surehold.campaigns.told import Told
+
 __all__ = ["PEERS", "REQUIRES", "installed_peers"]
 
 Array = NDArray[np.float64]
-
-
-class _Told:
-    """The initial design, and what was told."""
-
-    def __init__(self, initial: Array):
-        self.waiting = list(initial)
-        self.X: list[Array] = []
-        self.y: list[float] = []
-
-    def add(self, u: Array, y: float) -> None:
-        self.X.append(np.asarray(u, dtype=np.float64))
-        self.y.append(y)
-
-    def best(self) -> Array:
-        return self.X[int(np.argmax(self.y))]
 
 
 class Optuna:
@@ -52,7 +39,7 @@ class Optuna:
         self._space = {f"x{i}": optuna.distributions.FloatDistribution(0.0, 1.0) for i in range(dimension)}
         for u in initial:
             self._study.enqueue_trial({name: float(value) for name, value in zip(self._space, u, strict=True)})
-        self._told = _Told(initial)
+        self._told = Told(initial)
 
     def ask(self) -> Array:
         """Return the next trial."""
@@ -86,7 +73,7 @@ class BayesianOptimization:
             verbose=0,
             allow_duplicate_points=True,
         )
-        self._told = _Told(initial)
+        self._told = Told(initial)
 
     def ask(self) -> Array:
         """Return the next trial."""
@@ -116,7 +103,7 @@ class ScikitOptimize:
         self._optimizer = Optimizer(
             [(0.0, 1.0)] * dimension, "gp", n_initial_points=len(initial), acq_func="EI", random_state=seed
         )
-        self._told = _Told(initial)
+        self._told = Told(initial)
 
     def ask(self) -> Array:
         """Return the next trial."""
@@ -138,101 +125,13 @@ class ScikitOptimize:
         return self._told.best()
 
 
-class BoTorch:
-    """BoTorch: SingleTaskGP and LogExpectedImprovement; with the noise known, its input perturbation.
-
-    With `root` (d, d) of the noise's covariance in the unit cube (`bounded` for uniform noise) the model averages over
-    16 quasi-random perturbations, the criterion is the expected improvement of that average, and the answer the
-    observed input with the best one.
-    """
-
-    def __init__(self, dimension: int, initial: Array, seed: int, root: Array | None = None, bounded: bool = False):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # importing it warns
-            import torch
-            from botorch.acquisition.objective import ExpectationPosteriorTransform
-
-        _one_torch_thread()
-        torch.manual_seed(seed)
-        self._shifts = self._average = None
-        if root is not None:
-            from scipy.special import ndtr
-            from scipy.stats import qmc
-
-            normals = qmc.MultivariateNormalQMC(np.zeros(dimension), rng=np.random.default_rng(seed)).random(16)
-            standard = 3.0**0.5 * (2.0 * ndtr(normals) - 1.0) if bounded else normals
-            self._shifts = torch.tensor(standard @ root.T)
-            self._average = ExpectationPosteriorTransform(n_w=len(normals))
-        self._told = _Told(initial)
-        self._model: tuple[int, Any] | None = None
-
-    def ask(self) -> Array:
-        """Return the next trial."""
-        if self._told.waiting:
-            return self._told.waiting.pop(0)
-        import torch
-
-        X = torch.tensor(np.array(self._told.X))
-        best = max(self._told.y) if self._shifts is None else float(self._averages().max())
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            from botorch.acquisition import LogExpectedImprovement
-            from botorch.optim import optimize_acqf
-
-            criterion = LogExpectedImprovement(self._fitted(), best, posterior_transform=self._average)
-            bounds = torch.stack([torch.zeros(X.shape[1]), torch.ones(X.shape[1])]).to(X)
-            found, _ = optimize_acqf(criterion, bounds, q=1, num_restarts=10, raw_samples=256)
-        return found[0].numpy()
-
-    def tell(self, u: Array, y: float) -> None:
-        """Record a trial."""
-        self._told.add(u, y)
-
-    def answer(self) -> Array:
-        """Return the highest observed; with the noise known, the observed input whose average is expected best."""
-        if self._shifts is None:
-            return self._told.best()
-        return self._told.X[int(self._averages().argmax())]
-
-    def _averages(self) -> Any:
-        import torch
-
-        model = self._fitted()
-        with torch.no_grad(), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            posterior = model.posterior(
-                torch.tensor(np.array(self._told.X))[:, None], posterior_transform=self._average
-            )
-        return posterior.mean.reshape(-1)
-
-    def _fitted(self) -> Any:
-        n = len(self._told.y)
-        if self._model is None or self._model[0] != n:
-            import torch
-
-            y = torch.tensor(np.array(self._told.y))[:, None]
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                from botorch.fit import fit_gpytorch_mll
-                from botorch.models import SingleTaskGP
-                from botorch.models.transforms.input import InputPerturbation
-                from gpytorch.mlls import ExactMarginalLogLikelihood
-
-                transform = None if self._shifts is None else InputPerturbation(self._shifts)
-                model = SingleTaskGP(torch.tensor(np.array(self._told.X)), y, input_transform=transform)
-                fit_gpytorch_mll(ExactMarginalLogLikelihood(model.likelihood, model))
-                model.eval()
-            self._model = (n, model)
-        return self._model[1]
-
-
 class RandomSearch:
     """Uniform draws."""
 
     def __init__(self, dimension: int, initial: Array, seed: int):
         self._rng = np.random.default_rng([seed, 1])
         self._dimension = dimension
-        self._told = _Told(initial)
+        self._told = Told(initial)
 
     def ask(self) -> Array:
         """Return the next trial."""
@@ -255,6 +154,7 @@ PEERS: Final[dict[str, Callable[..., Any]]] = {
     "bayesian-optimization": BayesianOptimization,
     "scikit-optimize": ScikitOptimize,
     "botorch": BoTorch,
+    "botorch-turbo": BoTorchTrustRegion,
     "random": RandomSearch,
 }
 #: Modules that a peer needs.
@@ -265,6 +165,7 @@ REQUIRES: Final[dict[str, tuple[str, ...]]] = {
     "bayesian-optimization": ("bayes_opt",),
     "scikit-optimize": ("skopt",),
     "botorch": ("botorch",),
+    "botorch-turbo": ("botorch",),
     "random": (),
 }
 

@@ -4,20 +4,24 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from surehold.errors import unknown_name
-from surehold.problems.high_dimensional import HIGH_DIMENSIONAL
+from surehold.problems.high_dimensional import HIGH_DIMENSIONAL, HIGH_DIMENSIONAL_ROBUST
 from surehold.problems.published import PUBLISHED
 from surehold.problems.robust import ROBUST, RobustProblem
 from surehold.problems.synthetic import SYNTHETIC
 
 __all__ = ["NAMES", "has_own_noise", "named_function", "robust_problem"]
 
-_ROBUST: Final[dict[str, Callable[[], RobustProblem]]] = {**ROBUST, **PUBLISHED}
+_ROBUST: Final[dict[str, Callable[[], RobustProblem]]] = {
+    **ROBUST,
+    **PUBLISHED,
+    **HIGH_DIMENSIONAL_ROBUST,
+}
 #: All names that a plan, a study and the command line understand.
 NAMES: Final = (*SYNTHETIC, *_ROBUST, *HIGH_DIMENSIONAL)
 
 
 def robust_problem(name: str) -> RobustProblem:
-    """Return the robust problem of that name: "needle-2", ... (`robust`) or "nes-polynomial", ... (`published`).
+    """Return the robust problem of that name: "needle-2", ... (`robust`), "nes-polynomial", ... (`published`).
 
     Raises
     ------
