@@ -335,6 +335,14 @@ def test_a_flat_start_is_unknown_not_certain():
     assert stated == pytest.approx(10.0 * model.predict([[0.5, 0.5]], return_std=True)[1])
 
 
+@pytest.mark.parametrize("size", [5e-6, -3e8])
+def test_equal_outputs_may_vary_by_their_size(size):
+    X = np.random.default_rng(0).random((10, 2))
+    Q = np.random.default_rng(1).random((50, 2))
+    deviations = [GaussianProcess().fit(X, np.full(10, y)).predict(Q, return_std=True)[1] for y in (1.0, size)]
+    np.testing.assert_allclose(deviations[1], abs(size) * deviations[0], rtol=1e-9)
+
+
 @settings(deadline=None, max_examples=30)
 @given(st.integers(1, 12), st.integers(1, 5), st.integers(0, 2**31), st.sampled_from([0.0, 1e-12, 1e-9, 1e-3, 1.0]))
 def test_any_clustering_gives_numbers(n, d, seed, spread):

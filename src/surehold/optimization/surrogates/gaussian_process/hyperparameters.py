@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from surehold.defaults import (
     BURN_IN,
-    CURVATURE_STEP,
     MODE_REACH,
     MODE_STARTS,
     MODE_TOLERANCES,
@@ -28,6 +27,7 @@ from surehold.defaults import (
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.samplers.elliptical_slice import elliptical_slice_sample
 from surehold.optimization.samplers.slice import slice_sample
+from surehold.optimization.surrogates.gaussian_process.curvature import root_of_covariance
 from surehold.optimization.surrogates.gaussian_process.kernels import TWO_SCALES, kernel_number, shape_size
 from surehold.optimization.surrogates.gaussian_process.likelihood import (
     Evidence,
@@ -130,7 +130,7 @@ def learn(
     center, evaluations = mode(evidence)
     if learning.method == "map":
         return Learnt(center[None, :], evaluations)
-    root = _root_of_covariance(evidence, center)
+    root = root_of_covariance(evidence, center)
     return _around(evidence, learning, learning.particles, center, root, rng, evaluations + center.size + 1)
 
 
@@ -186,26 +186,9 @@ def _around(
 
 def log_evidence_and_root(evidence: Evidence, center: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Return about log p(y | X, model) by Laplace's method at the mode (p,), and the root of theta's covariance."""
-    root = _root_of_covariance(evidence, center)
+    root = root_of_covariance(evidence, center)
     volume = float(np.linalg.slogdet(root)[1]) + 0.5 * center.size * log(2.0 * pi)
     return log_posterior(center, evidence) + volume, root
-
-
-def _root_of_covariance(evidence: Evidence, center: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return R (p, p) such that R R' is about the covariance of theta, from the curvature at the mode (p,)."""
-    p = center.size
-    level = log_posterior_and_gradient(center, evidence)[1]
-    precision = np.empty((p, p))
-    for i in range(p):
-        step = np.zeros(p)
-        step[i] = CURVATURE_STEP
-        precision[i] = (level - log_posterior_and_gradient(center + step, evidence)[1]) / CURVATURE_STEP
-    deviation = evidence.prior_deviation
-    scaled = 0.5 * (precision + precision.T) * np.outer(deviation, deviation)
-    if not np.all(np.isfinite(scaled)):
-        return np.diag(deviation)
-    values, vectors = np.linalg.eigh(scaled)
-    return deviation[:, None] * vectors / np.sqrt(np.maximum(values, 1.0))  # nothing is wider than its prior
 
 
 def from_prior(evidence: Evidence, particles: int, rng: np.random.Generator) -> Learnt:
