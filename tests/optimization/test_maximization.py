@@ -451,6 +451,9 @@ def test_what_is_shown_of_a_mixed_box_is_what_can_be_commanded():
     best, shown = result.recommendation, result._repr_html_()
     assert f"<th>f</th><td>{best.parameters['f']:.6g}</td>" in shown
     assert f"<th>grip</th><td>{escape(best.parameters['grip'])}</td>" in shown
+    first = result.trials[0]
+    assert first.parameters.keys() == {"f", "grip"}
+    assert f"'grip': '{first.parameters['grip']}'" in repr(first)
     assert "mean=1e+06" not in repr(result), "and a mean far from zero in the digits that say something"
 
     def wrong(p):

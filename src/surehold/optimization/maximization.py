@@ -17,7 +17,7 @@ from surehold.optimization.evaluation import Evaluation, in_processes, one_by_on
 from surehold.optimization.limits import returned_outputs
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.progress import progress_bar
-from surehold.optimization.recommendation import Recommendation, in_digits
+from surehold.optimization.recommendation import Recommendation, in_digits, place
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,6 +50,8 @@ class Trial:
         Time that asking took.
     outputs
         Further outputs, such as {"torque": 3.1}.
+    parameters
+        x as {name: value}.
     """
 
     index: int
@@ -60,10 +62,11 @@ class Trial:
     recommendation: Recommendation | None
     seconds: float
     outputs: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         what = self.failure or f"y={self.y:.6g}"
-        return f"Trial(index={self.index}, x={np.array2string(self.x, precision=6, separator=', ')}, {what})"
+        return f"Trial(index={self.index}, {place(self.x, self.parameters)}, {what})"
 
 
 @dataclass(frozen=True)
@@ -322,7 +325,8 @@ def _told(optimizer: Optimizer, evaluation: Evaluation, index: int) -> Trial:
     if np.any(np.isfinite(values)):
         best = float(np.nanmin(values) if optimizer.direction == "minimize" else np.nanmax(values))
     modelled = len(values) >= optimizer.n_initial and np.isfinite(optimizer.y).any()
-    return Trial(index, asked.x, y, failure, best, optimizer.recommend() if modelled else None, seconds, outputs)
+    answer = optimizer.recommend() if modelled else None
+    return Trial(index, asked.x, y, failure, best, answer, seconds, outputs, asked.parameters)
 
 
 def _ends(callback: Callable[[Trial], Any], trial: Trial) -> bool:

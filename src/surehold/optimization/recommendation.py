@@ -28,6 +28,7 @@ __all__ = [
     "expectation_at",
     "in_digits",
     "outliers_in_words",
+    "place",
     "recommendation",
 ]
 
@@ -144,10 +145,7 @@ class Recommendation:
 
     def __repr__(self) -> str:
         mean, quantile = (in_digits(value, self.std, 6) for value in (self.mean, self.quantile))
-        plain = list(self.parameters.values()) == self.x.tolist()
-        named = {k: float(f"{v:.6g}") if isinstance(v, float) else v for k, v in self.parameters.items()}
-        where = f"x={np.array2string(self.x, precision=6, separator=', ')}" if plain else f"parameters={named}"
-        return f"Recommendation({where}, mean={mean}, std={self.std:.3g}, quantile={quantile})"
+        return f"Recommendation({place(self.x, self.parameters)}, mean={mean}, std={self.std:.3g}, quantile={quantile})"
 
     def probability_below(self, value: float) -> float:
         """Return the probability that the next execution gives less than `value`."""
@@ -270,3 +268,11 @@ def recommendation(
         Outcome(sign * expectation.means, expectation.stds),
         box.as_dict(x),
     )
+
+
+def place(x: NDArray[np.float64], parameters: Mapping[str, Any]) -> str:
+    """Return an input (d,) as it is shown: as numbers where it is nothing else, or by names."""
+    if not parameters or list(parameters.values()) == x.tolist():
+        return f"x={np.array2string(x, precision=6, separator=', ')}"
+    named = {k: float(f"{v:.6g}") if isinstance(v, float) else v for k, v in parameters.items()}
+    return f"parameters={named}"

@@ -56,5 +56,6 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
         attributes = stored[int(history.numbers[i])].user_attrs
         failure = "" if np.isfinite(history.y[i]) else attributes.get(VETOED) or attributes.get(NOTE) or "failed"
         x, y = history.X[i], float(values[i])
-        trials.append(Trial(int(history.numbers[i]), x, y, failure, float(best[i]), recommendations.get(i + 1), 0.0))
+        number, answer, parameters = int(history.numbers[i]), recommendations.get(i + 1), optimizer.box.as_dict(x)
+        trials.append(Trial(number, x, y, failure, float(best[i]), answer, 0.0, parameters=parameters))
     return Result(optimizer, tuple(trials), recommendations[n], interrupted)

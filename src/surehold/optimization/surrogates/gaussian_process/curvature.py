@@ -9,6 +9,8 @@ Of many hyperparameters the trials determine few: S is taken along the direction
 method), and as the same in all others, the mean over some random ones.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,7 +39,7 @@ def root_of_covariance(evidence: Evidence, center: Array) -> Array:
 
 
 def _root_along_few_directions(evidence: Evidence, center: Array) -> Array:
-    from scipy.sparse.linalg import LinearOperator, eigsh
+    from scipy.sparse import linalg
 
     p, deviation = center.size, evidence.prior_deviation
     level = log_posterior_and_gradient(center, evidence)[1]
@@ -51,8 +53,9 @@ def _root_along_few_directions(evidence: Evidence, center: Array) -> Array:
         product = length * deviation * _curvature_along(step, evidence, center, level)
         return np.where(np.isfinite(product), product, 0.0)
 
-    operator = LinearOperator((p, p), matvec=scaled, dtype=np.float64)
-    values, vectors = eigsh(operator, k=DETERMINED, which="LA", tol=0.1, v0=np.ones(p))
+    sparse: Any = linalg  # whose stubs know neither operators by function nor tolerances
+    operator = sparse.LinearOperator((p, p), matvec=scaled, dtype=np.float64)
+    values, vectors = sparse.eigsh(operator, k=DETERMINED, which="LA", tol=0.1, v0=np.ones(p))
     others = np.random.default_rng(0).choice([-1.0, 1.0], (p, UNDETERMINED_PROBES))
     others -= vectors @ (vectors.T @ others)
     rest = max(float(np.mean([z @ scaled(z) / (z @ z) for z in others.T])), 1.0)
