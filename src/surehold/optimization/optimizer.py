@@ -296,7 +296,8 @@ class Optimizer(Record):
         Parameters
         ----------
         where
-            "observed": among the inputs that were tried, thesis (3.22). "box": anywhere in the box, by the model.
+            "observed": among the inputs that were tried, thesis (3.22). "box": anywhere in the box, by the model; under
+            input noise seldom farther from a tried input than the noise carries.
 
         Raises
         ------
@@ -310,15 +311,6 @@ class Optimizer(Record):
             posterior = self.posterior
             if not len(history.tried) and self._requirements is not None:
                 where, history = "observed", self._requirements.nearest(self._trials)
-            if where == "observed":
-                index = int(ranking.order(posterior, history.tried, history.observed)[0])
-                u, observed = history.tried[index], float(history.observed[index])
-            else:
-                rng = self._rng(3, len(self._trials))
-                strict = None if self._requirements is None else self._requirements.strict(self._trials)
-                u, observed = self._snapped(ranking.best(posterior, history.tried, rng, strict)), np.nan
-            if self.box.uncontrolled is not None:
-                u = self.box.uncontrolled.at_mean(u)
             reached = Perturbations.of(
                 self.input_noise,
                 self.box,
@@ -327,6 +319,15 @@ class Optimizer(Record):
                 exponent=OUTCOME_EXPONENT,
                 allowed=ranking.accurate.allowed,
             )
+            if where == "observed":
+                index = int(ranking.order(posterior, history.tried, history.observed)[0])
+                u, observed = history.tried[index], float(history.observed[index])
+            else:
+                rng = self._rng(3, len(self._trials))
+                strict = None if self._requirements is None else self._requirements.strict(self._trials)
+                u, observed = self._snapped(ranking.best(posterior, history.tried, rng, reached, strict)), np.nan
+            if self.box.uncontrolled is not None:
+                u = self.box.uncontrolled.at_mean(u)
             best = int(np.argmax(history.observed))
             highest, top = (history.tried[best], float(history.observed[best])), int(np.nanargmax(self._trials.values))
             if self._trials.values[top] > highest[1]:  # which is no answer

@@ -23,6 +23,7 @@ def f(X):
 
 
 TRIED = np.random.default_rng(0).permutation(np.linspace(0.02, 0.98, 25))[:, None]
+FINER = Perturbations(quasi_monte_carlo(S, 7))
 HISTORY = History(TRIED, f(TRIED), NONE, NONE)
 
 
@@ -63,11 +64,21 @@ def test_observed_values_decide_where_nothing_is_uncertain(posterior):
 @pytest.mark.parametrize("risk", ["mean", "mean-std", "cvar", "worst"])
 def test_the_best_input_of_the_box(risk, posterior):
     """With a risk measure the best tried input came back: everything counted as an infinite improvement."""
-    best = ranking_of(risk).best(posterior, TRIED, np.random.default_rng(0))
+    best = ranking_of(risk).best(posterior, TRIED, np.random.default_rng(0), FINER)
     values = outcome(posterior, GRID, risk)
     found = outcome(posterior, best[None, :], risk)[0]
     assert found > values.max() - 0.02 * np.ptp(values)
     assert not np.any(np.all(best == TRIED, axis=1))
+
+
+def test_the_best_input_of_the_box_is_that_of_the_finer_perturbations(posterior):
+    """Four perturbations alone put it elsewhere: their average is highest beside the best place."""
+    few = Perturbations(quasi_monte_carlo(S, 2))
+    ranking = Ranking(few, few, Risk(), False)
+    best, alone = (ranking.best(posterior, TRIED, np.random.default_rng(0), points) for points in (FINER, few))
+    values = outcome(posterior, GRID)
+    assert outcome(posterior, best[None, :])[0] > values.max() - 1e-3 * np.ptp(values)
+    assert abs(alone - best) > 3.0 * abs(GRID[np.argmax(values)] - best)
 
 
 def test_incumbents(posterior):

@@ -17,6 +17,7 @@ from surehold.defaults import ANCHORS, CONTENDERS, SCREENING_DIVISOR, SHORTLIST
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
 from surehold.optimization.acquisition.scales import Acquisition, CriterionName, Scale
 from surehold.optimization.constraints.admission import Admission
+from surehold.optimization.maximizer.ascent import climb
 from surehold.optimization.maximizer.multistart import multistart
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
@@ -98,21 +99,26 @@ class Ranking:
         posterior: Posterior,
         tried: NDArray[np.float64],
         rng: np.random.Generator,
+        finer: Perturbations,
         admission: Admission | None = None,
     ) -> NDArray[np.float64]:
-        """Return the point of the cube (d,) with the best modelled outcome; `tried` (n, d) guide the search."""
+        """Return the point of the cube (d,) with the best modelled outcome; `tried` (n, d) guide the search.
+
+        By the mean, the best of those found climb on by the `finer` perturbations, which decide: an average over few of
+        them is highest a little beside the best place.
+        """
         anchors = tried[self.order(posterior, tried)[:ANCHORS]]
         if self.risk.name == "mean":
-            mean = CriterionName("ucb", "robust")
-            objective, screen = (
-                Acquisition(posterior, mean, perturbations, 0.0, kappa=0.0)
-                for perturbations in (self.accurate, self.coarse)
-            )
+            objective, screen = (_mean_outcome(posterior, points) for points in (self.accurate, self.coarse))
         else:
             objective = screen = self._measured(posterior)
         found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, admission)
         candidates = np.concatenate([anchors[:1], found[:ANCHORS]])
-        return candidates[self.order(posterior, candidates)[0]]
+        if self.risk.name != "mean" or self.exact_inputs or admission is not None:
+            return candidates[self.order(posterior, candidates)[0]]
+        whole = np.zeros_like(candidates), np.ones_like(candidates)
+        tops, values = climb(_mean_outcome(posterior, finer), candidates, *whole)
+        return tops[int(np.argmax(values))]
 
     def trials(self, posterior: Posterior, history: History, exactly: bool) -> NDArray[np.intp]:
         """Return the indices of the tried inputs, best first; `exactly`: as if there were no input noise."""
@@ -193,6 +199,10 @@ def _latest_of_equals(values: NDArray[np.float64]) -> NDArray[np.intp]:
     Where trials only succeed or fail, all that succeeded are equal.
     """
     return len(values) - 1 - np.argsort(-values[::-1], kind="stable")
+
+
+def _mean_outcome(posterior: Posterior, perturbations: Perturbations) -> Acquisition:
+    return Acquisition(posterior, CriterionName("ucb", "robust"), perturbations, 0.0, kappa=0.0)
 
 
 def _outcomes(posterior: Posterior, perturbations: Perturbations, U: NDArray[np.float64]) -> NDArray[np.float64]:
