@@ -71,11 +71,13 @@ def asks(quick: bool) -> Iterator[Row]:
 
 
 def grown(quick: bool) -> Iterator[Row]:
-    """Yield asks among many trials, with the default settings."""
+    """Yield asks among many trials and in many variables, with the default settings."""
     for name, (cold, warm, memory) in growth.rows((300, 1000) if quick else growth.SIZES):
         n = int(name.split(",")[0].removeprefix("n = "))
         yield Row(f"first ask, default, {name}", cold, 2.0 if n in GROWTH else None)
         yield Row(f"ask, default, {name}", warm, GROWTH.get(n), factorization(min(n, MANY)), memory)
+    for name, seconds in growth.in_many_variables():
+        yield Row(f"ask, default, {name}", seconds)
 
 
 def grasps(quick: bool) -> Iterator[Row]:
