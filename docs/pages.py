@@ -49,11 +49,13 @@ PUBLISHED: Final = """# Robust problems of other papers
 
 Sixteen problems on which others have measured robust optimization, with the budgets, initial designs, input noise and
 measures of their papers (`sh.problems.robust_problem`); every method with the same initial designs, {count} runs each.
-Shown is what the answer lacks to the best one under the noise, exactly, in the problem's units: the mean with its
-standard error, and how many runs end within 1 % of the best value. The first two are told of the noise and of the
-measure, the thesis' UEI and BoTorch of the noise; their answers are best in the mean. The others know of neither.
-`surehold campaign run robust-published`; traces, medians and the seeds that only some methods have:
-{{doc}}`reproduction </reproduction>`.
+The first two are told of the noise and of the measure, the thesis' UEI and BoTorch of the noise; their answers are best
+in the mean. The others know of neither. `surehold campaign run robust-published`; traces, medians and the seeds that
+only some methods have: {{doc}}`reproduction </reproduction>`.
+
+Of {count} runs, those whose answer is within 1 % of the best value under the noise:
+"""
+LOST: Final = """What the answer lacks to the best one, exactly, in the problem's units: mean and standard error.
 """
 
 
@@ -113,21 +115,26 @@ def _published() -> str:
     regrets = {(row["problem"], row["method"], row["seed"]): row["regret"][-1][1] for row in done}
     pairs = {(problem, method) for problem in plan.problems for method in plan.methods}
     seeds = [s for s in range(plan.runs) if all((*pair, s) in regrets for pair in pairs)]
-    lines = [f"| | {' | '.join(plan.methods)} |", "|---" * (1 + len(plan.methods)) + "|"]
+    head = [f"| | {' | '.join(plan.methods)} |", "|---" * (1 + len(plan.methods)) + "|"]
+    found, lost = list(head), list(head)
     for problem, on in plan.problems.items():
-        best = abs(robust_problem(on.function).optimum.value)
-        cells = []
-        for method in plan.methods:
-            lost = np.array([regrets[problem, method, s] for s in seeds])
-            mean, error = (f"{float(f'{v:.2g}'):.10g}" for v in (lost.mean(), lost.std(ddof=1) / len(seeds) ** 0.5))
-            cells.append(f"{mean} ({error}), {np.sum(lost <= 0.01 * best)}")
-        lines.append(f"| {problem} | {' | '.join(cells)} |")
+        enough = 0.01 * abs(robust_problem(on.function).optimum.value)
+        rows = [np.array([regrets[problem, method, s] for s in seeds]) for method in plan.methods]
+        found.append(f"| {problem} | {' | '.join(str(np.sum(row <= enough)) for row in rows)} |")
+        lost.append(f"| {problem} | {' | '.join(_with_error(row) for row in rows)} |")
     seconds = [
         np.mean([row["cpu_seconds"] for row in done if row["method"] == method and row["seed"] in seeds])
         for method in plan.methods
     ]
-    lines.append(f"| CPU s a run | {' | '.join(f'{value:.2g}' for value in seconds)} |")
-    return "\n".join([PUBLISHED.format(count=len(seeds)), *lines]) + "\n"
+    found.append(f"| CPU s a run | {' | '.join(f'{value:.2g}' for value in seconds)} |")
+    return "\n".join([PUBLISHED.format(count=len(seeds)), *found, "", LOST, *lost]) + "\n"
+
+
+def _with_error(values: np.ndarray) -> str:
+    """Return the mean of values (n,) and its standard error in two digits."""
+    both = values.mean(), values.std(ddof=1) / len(values) ** 0.5
+    mean, error = (f"{float(f'{value:.2g}'):.10g}" for value in both)
+    return f"{mean} ({error})"
 
 
 def _speed() -> str:
