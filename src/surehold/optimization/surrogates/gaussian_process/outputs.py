@@ -35,8 +35,9 @@ class Standardization(NamedTuple):
         """Return the map to zero mean and unit standard deviation of y (n,).
 
         Outputs that do not differ, or by less than 1e-150, say nothing about the scale: it is their size, 1 where they
-        are 0, and `flat` says so. A stated `output_range` (lowest and highest value to expect) sets the scale instead:
-        the range counts as four standard deviations, or the data's own spread where that is larger.
+        are 0 or only one is there, and `flat` says so. A stated `output_range` (lowest and highest value to expect)
+        sets the scale instead: the range counts as four standard deviations, or the data's own spread where that is
+        larger.
         """
         flat = _is_flat(y)
         top = float(np.abs(y).max()) if len(y) else 0.0
@@ -46,7 +47,7 @@ class Standardization(NamedTuple):
         spread = 0.0 if flat else factor * float(unit.std())
         if output_range is not None:
             return cls(shift, max((output_range[1] - output_range[0]) / 4.0, spread), flat)
-        return cls(shift, spread if spread > 0.0 else factor, flat)
+        return cls(shift, spread if spread > 0.0 else factor if len(y) > 1 else 1.0, flat)
 
     def coarse(self) -> "Standardization":
         """Return the map with its scale rounded to a power of sqrt(2): one more output seldom changes it."""
