@@ -179,9 +179,8 @@ MODE_TOLERANCES: Final = {"maxiter": 50, "ftol": 1e-5, "gtol": 1e-2}
 #: Step of the differences of gradients that give the curvature at the mode, in logarithms. Never measured.
 CURVATURE_STEP: Final = 0.05
 #: Of more hyperparameters the curvature is taken along so many directions, in which it is largest, and as the same in
-#: all others, its mean over so many random ones. In 1,000 variables the deviations of theta are right to 9 %, and log
-#: evidences of two models against each other to 1; an ask takes 3 s, with the whole curvature 44 (the time: python -m
-#: benchmarks.growth).
+#: all others, its mean over so many random ones. In 1,000 variables standard deviations are right to 8 %, the log
+#: evidences of two models against each other to 2, in a fifteenth of the time: python -m benchmarks.curvature.
 MANY_HYPERPARAMETERS: Final = 150
 DETERMINED: Final = 16
 UNDETERMINED_PROBES: Final = 8

@@ -38,6 +38,21 @@ def test_every_method_asks_first_for_the_design_and_answers_with_a_good_point(na
         assert hill(answer) == pytest.approx(max(hill(u) for u in asked))
 
 
+def test_a_trust_region_that_became_too_small_begins_anew():
+    if "botorch-turbo" not in installed_peers():
+        pytest.skip("botorch is not installed")
+    initial = qmc.LatinHypercube(2, rng=1).random(6)
+    method = PEERS["botorch-turbo"](2, initial, 0)
+    for u in initial:
+        method.tell(method.ask(), hill(u))
+    for _ in range(4 * 7):  # four failures halve a side of 0.8, seven halvings are one too many
+        method.tell(np.zeros(2), -1.0)
+    again = [method.ask() for _ in range(6)]
+    assert np.all(np.ptp(again, axis=0) > 0.3)
+    assert len(np.unique(again, axis=0)) == 6
+    assert hill(method.answer()) == max(hill(u) for u in initial), "what was found before is not forgotten"
+
+
 def test_a_missing_library_is_named(monkeypatch):
     monkeypatch.setitem(REQUIRES, "optuna-tpe", ("no_such_library",))
     plan = Plan("p", "t", {"a": ProblemSetup("gf", 9, 6)}, {"m": MethodSetup("optuna-tpe")})

@@ -296,8 +296,7 @@ class Optimizer(Record):
         Parameters
         ----------
         where
-            "observed": among the inputs that were tried, thesis (3.22). "box": anywhere in the box, by the model; under
-            input noise seldom farther from a tried input than the noise carries.
+            "observed": among the inputs that were tried, thesis (3.22). "box": anywhere in the box, by the model.
 
         Raises
         ------
