@@ -21,6 +21,8 @@ __all__ = ["root_of_covariance"]
 
 Array = NDArray[np.float64]
 
+_RESTARTS = 20  # of Lanczos' method, which needs one to three
+
 
 def root_of_covariance(evidence: Evidence, center: Array) -> Array:
     """Return R (p, p) at the mode `center` (p,) of the log posterior; D where the curvature is not finite."""
@@ -43,7 +45,7 @@ def _root_along_few_directions(evidence: Evidence, center: Array) -> Array:
 
     p, deviation = center.size, evidence.prior_deviation
     level = log_posterior_and_gradient(center, evidence)[1]
-    if not np.all(np.isfinite(level)):
+    if not (np.all(np.isfinite(level)) and level.any()):  # zeros are the gradient where there is no density
         return np.diag(deviation)
 
     def scaled(direction: Array) -> Array:
@@ -55,7 +57,10 @@ def _root_along_few_directions(evidence: Evidence, center: Array) -> Array:
 
     sparse: Any = linalg  # whose stubs know neither operators by function nor tolerances
     operator = sparse.LinearOperator((p, p), matvec=scaled, dtype=np.float64)
-    values, vectors = sparse.eigsh(operator, k=DETERMINED, which="LA", tol=0.1, v0=np.ones(p))
+    try:
+        values, vectors = sparse.eigsh(operator, k=DETERMINED, which="LA", tol=0.1, v0=np.ones(p), maxiter=_RESTARTS)
+    except sparse.ArpackNoConvergence as error:  # differences are no exact products: what has converged counts
+        values, vectors = error.eigenvalues, error.eigenvectors
     others = np.random.default_rng(0).choice([-1.0, 1.0], (p, UNDETERMINED_PROBES))
     others -= vectors @ (vectors.T @ others)
     rest = max(float(np.mean([z @ scaled(z) / (z @ z) for z in others.T])), 1.0)
