@@ -3,6 +3,7 @@ import pytest
 from filterpy.kalman import JulierSigmaPoints, MerweScaledSigmaPoints
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import norm
 
 from surehold.errors import InputError
 from surehold.optimization.noise.quadratures import (
@@ -133,3 +134,13 @@ def test_bounded_noise_against_an_integral_over_the_rectangle(name):
 
     expected = dblquad(lambda y, x: f(x, y), -half[0], half[0], -half[1], half[1])[0] / (4.0 * half.prod())
     assert weights @ f(*points.T) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("bounded", [False, True])
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_quasi_random_points_are_all_different_along_each_variable_and_take_equal_shares_of_the_noise(bounded, d):
+    points, _ = quasi_monte_carlo(np.eye(d), 6, bounded)
+    shares = (np.arange(64) + 0.5) / 64
+    even = 2.0 * shares - 1.0 if bounded else norm.ppf(shares)
+    for column in points.T:
+        np.testing.assert_allclose(np.sort(column), even / np.sqrt(np.mean(even**2)), atol=1e-12)

@@ -18,11 +18,11 @@ from surehold.optimization.strategy.trust_region import TrustRegion
 SETTINGS = {"quadrature": None, "k": 1.0, "border": "extend", "kappa": 2.0, "noisy": False}
 
 
-def named(criterion=None, risk="mean", noise=0.1, trust_region=None, thesis=None, **settings):
+def named(criterion=None, risk="mean", noise=0.1, trust_region=None, thesis=None, d=2, **settings):
     input_noise = None if noise is None else InputNoise.unit(noise)
     settings = {**SETTINGS, **settings}
     return strategy_named(
-        criterion, Risk(risk), Box.unit(2), input_noise, trust_region=trust_region, thesis=thesis, **settings
+        criterion, Risk(risk), Box.unit(d), input_noise, trust_region=trust_region, thesis=thesis, **settings
     )
 
 
@@ -69,6 +69,7 @@ def test_a_trust_region_does_not_cover():
 
 def test_the_quadrature_of_each_form():
     points = {name: len(named(name).ranking.accurate.quadrature.weights) for name in ("uei", "robust_ei")}
-    assert points == {"uei": 5, "robust_ei": 32}
+    assert points == {"uei": 5, "robust_ei": 64}
+    assert [len(named("robust_ei", d=d).ranking.accurate.quadrature.weights) for d in (3, 4)] == [64, 32]
     weights = named("uei", quadrature="unscented", k=0.0).ranking.accurate.quadrature.weights
     np.testing.assert_allclose(weights, [0.0, 0.25, 0.25, 0.25, 0.25])

@@ -175,7 +175,8 @@ def quasi_monte_carlo(
     Of uniform noise with that covariance where it is `bounded`.
 
     For spread and quantiles, which a handful of sigma points cannot give. Points come in pairs of opposite sign, so
-    that the mean is exactly 0.
+    that the mean is exactly 0. The shift is a quarter of the sequence's step: mirrored points lie between the others,
+    and along each variable all 2**exponent are different and, as shares of the noise, evenly spaced.
     """
     from scipy.special import ndtri
     from scipy.stats import qmc
@@ -184,7 +185,7 @@ def quasi_monte_carlo(
     if len(noisy) == 0:
         return exact(d)
     half = 2 ** (exponent - 1)
-    uniform = qmc.Sobol(len(noisy), scramble=False).random_base2(exponent - 1) + 0.5 / half
+    uniform = qmc.Sobol(len(noisy), scramble=False).random_base2(exponent - 1) + 0.25 / half
     normal = 2.0 * uniform - 1.0 if bounded else ndtri(uniform)
     normal /= np.sqrt(np.mean(normal**2, axis=0))  # unit variance exactly, too
     offsets = np.zeros((2 * half, d))

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from surehold.defaults import FEW_VARIABLES, QUASI_RANDOM_EXPONENT, QUASI_RANDOM_EXPONENT_OF_FEW
 from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.acquisition.scales import criterion_name
@@ -64,7 +65,9 @@ def strategy_named(
         raise InputError(f"{what} needs input noise; give input_noise=.")
     default = "quasi_monte_carlo" if name.scale == "robust" or averse else "unscented"
     rule = default if quadrature is None else quadrature
-    accurate = Perturbations.of(input_noise, box, rule, border, k=k, allowed=allowed)
+    few = box.dimension <= FEW_VARIABLES and not averse
+    exponent = QUASI_RANDOM_EXPONENT_OF_FEW if few else QUASI_RANDOM_EXPONENT
+    accurate = Perturbations.of(input_noise, box, rule, border, k=k, exponent=exponent, allowed=allowed)
     risk.check_weights(accurate.quadrature.weights, rule)
     coarse = Perturbations.of(input_noise, box, "unscented", border, allowed=allowed)
     ranking = Ranking(accurate, coarse, risk, noisy, screened=thesis is None)

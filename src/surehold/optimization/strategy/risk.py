@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import SCREENING_DIVISOR
 from surehold.optimization.acquisition.risk_measures import RiskImprovement, WorstCaseBound
 from surehold.optimization.acquisition.where_to_look import where_to_look
 from surehold.optimization.maximizer.multistart import multistart
@@ -46,7 +47,8 @@ class RiskAverse:
                 return found
             return np.concatenate([bound.weakest(found[0]), found])
         improvement = RiskImprovement(posterior, accurate, risk, best, rng)
-        found = multistart(improvement, improvement, d, anchors, rng, regions, history.admission)
+        screen = improvement.thinned(SCREENING_DIVISOR)
+        found = multistart(improvement, screen, d, anchors, rng, regions, history.admission)
         if not len(found):
             return found
         return np.concatenate([where_to_look(posterior, found[0], accurate, self.ranking.coarse), found])

@@ -153,6 +153,17 @@ def test_draws_have_the_posterior_moments(data, learnt):
         np.testing.assert_allclose((draws[:, i] @ w).var(axis=1), together, rtol=0.05, atol=1e-7)
 
 
+@pytest.mark.parametrize("clipped", [False, True])
+def test_draws_of_many_queries_at_once_are_those_of_each_alone(learnt, clipped):
+    rng = np.random.default_rng(8)
+    points = rng.random((5, 1, 2)) + 0.2 * rng.standard_normal((6, 2))
+    points = np.clip(points, 0.0, 1.0) if clipped else points
+    normals = rng.standard_normal((4, 6))
+    together = learnt.sample(points, normals)
+    alone = np.concatenate([learnt.sample(points[i : i + 1], normals) for i in range(5)], axis=1)
+    np.testing.assert_allclose(together, alone, atol=1e-6)
+
+
 def test_pending_trials_equal_a_refit_on_their_means(data):
     X, y, Q = data
     fixed = {"length_scales": [0.3, 0.6], "signal_variance": 1.3, "standardize": False, "noise": 0.1}

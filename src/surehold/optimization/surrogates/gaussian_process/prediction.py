@@ -38,6 +38,7 @@ from surehold.store.kernels import njit
 __all__ = ["average", "factorize", "sample"]
 
 _LARGEST_REPAIR = 1e-2  # nugget ratio beyond which a factorization is given up
+_ALIKE = 1e-12  # box widths between perturbations that differ by rounding only
 _REPAIRS = 12  # nuggets that are tried for a draw, each ten times the one before: NaN is never factorized
 
 
@@ -164,21 +165,34 @@ def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel
 def sample(P, normals, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha):
     """Return joint draws (m, q, b, s) of f at the points P (q, s, d), from standard normals (b, s).
 
-    NaN where the points' covariance cannot be factorized.
+    NaN where the points' covariance cannot be factorized. Before any trial, points that lie to each other as those of
+    the first query do have its covariance.
     """
     m, n = alpha.shape
-    q, s, _ = P.shape
+    q, s, d = P.shape
+    alike = np.empty(q, dtype=np.bool_)
+    for i in range(q):
+        apart = 0.0
+        for w in range(s):
+            for k in range(d):
+                apart = max(apart, abs((P[i, w, k] - P[i, 0, k]) - (P[0, w, k] - P[0, 0, k])))
+        alike[i] = apart < _ALIKE
     draws = np.empty((m, q, normals.shape[0], s))
     K = np.empty((n, s))
+    first = np.empty((s, s))
     C = np.empty((s, s))
     for j in range(m):
+        cross_correlation(kernel, P[0], P[0], inverse_l[j], first)
         for i in range(q):
             cross_correlation(kernel, X, P[i], inverse_l[j], K)
             for a in range(n):
                 for w in range(s):
                     K[a, w] = s2[j] * K[a, w] + mean_variance
             V = np.dot(inverse_L[j], K)
-            cross_correlation(kernel, P[i], P[i], inverse_l[j], C)
+            if alike[i]:
+                C[:] = first
+            else:
+                cross_correlation(kernel, P[i], P[i], inverse_l[j], C)
             for w in range(s):
                 for o in range(s):
                     C[w, o] = s2[j] * C[w, o] + mean_variance
@@ -195,11 +209,7 @@ def sample(P, normals, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha
                 nugget *= 10.0
             else:
                 root[:] = np.nan
-            mean = np.dot(alpha[j], K)
-            for b in range(normals.shape[0]):
-                for w in range(s):
-                    t = mean[w]
-                    for o in range(w + 1):
-                        t += root[w, o] * normals[b, o]
-                    draws[j, i, b, w] = t
+            for w in range(s):
+                root[w, w + 1 :] = 0.0
+            draws[j, i] = np.dot(alpha[j], K) + np.dot(normals, root.T)
     return draws
