@@ -93,13 +93,15 @@ JOINT_POINTS: Final = 512
 
 # --- quadratures of the input noise -----------------------------------------------------------------------------------
 
-#: Quasi-random points, as a power of two, by which outcomes are averaged; and those in a box of so few variables.
-#: What a rule alone loses, in per cent of the range: on 36 training landscapes of one to three variables 0.05 with 32
-#: points and 0.007 with 64, on 64 of four to eight variables 0.49 and 0.25: python -m benchmarks.rule_regret --family
-#: 100. With 64 an ask takes 1.5 times as long, one of a risk measure 2.7 times.
+#: Quasi-random points, as a power of two, by which outcomes are averaged; and their mean in a box of so few variables.
+#: What a rule alone loses: python -m benchmarks.rule_regret --family 100. With 64 points asks under noise take 1.5 times
+#: as long as with 32, those of a risk measure 2.7 times.
 QUASI_RANDOM_EXPONENT: Final = 5
 QUASI_RANDOM_EXPONENT_OF_FEW: Final = 6
 FEW_VARIABLES: Final = 3
+#: Scramblings of which the points with the least discrepancy are taken. Never measured against other numbers; the rule
+#: as it comes out: python -m benchmarks.rule_regret --family 100.
+SCRAMBLINGS: Final = 64
 #: Representative conditions, of uncontrolled variables, by which candidates are screened. Never measured.
 COARSE_CONDITIONS: Final = 8
 #: The same for the description of the recommended input: quantiles need more points than means. Never measured.

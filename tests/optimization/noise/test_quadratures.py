@@ -3,7 +3,7 @@ import pytest
 from filterpy.kalman import JulierSigmaPoints, MerweScaledSigmaPoints
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
 from surehold.errors import InputError
 from surehold.optimization.noise.quadratures import (
@@ -136,11 +136,24 @@ def test_bounded_noise_against_an_integral_over_the_rectangle(name):
     assert weights @ f(*points.T) == pytest.approx(expected, rel=1e-3)
 
 
-@pytest.mark.parametrize("bounded", [False, True])
-@pytest.mark.parametrize("d", [1, 2, 3])
-def test_quasi_random_points_are_all_different_along_each_variable_and_take_equal_shares_of_the_noise(bounded, d):
-    points, _ = quasi_monte_carlo(np.eye(d), 6, bounded)
+@pytest.mark.parametrize("d", [1, 2, 3, 7])
+def test_quasi_random_points_take_equal_shares_of_the_noise_along_each_variable(d):
     shares = (np.arange(64) + 0.5) / 64
-    even = 2.0 * shares - 1.0 if bounded else norm.ppf(shares)
-    for column in points.T:
-        np.testing.assert_allclose(np.sort(column), even / np.sqrt(np.mean(even**2)), atol=1e-12)
+    uniform, _ = quasi_monte_carlo(np.eye(d), 6, bounded=True)
+    normal, _ = quasi_monte_carlo(np.eye(d), 6)
+    for rule, even, off in ((uniform, 2.0 * shares - 1.0, 1e-12), (normal, norm.ppf(shares), 0.5)):
+        for column in rule.T:
+            np.testing.assert_allclose(np.sort(column), even / np.sqrt(np.mean(even**2)), atol=off)
+
+
+@pytest.mark.parametrize(("d", "exponent"), [(1, 5), (2, 5), (7, 5), (16, 5), (3, 6), (8, 7)])
+def test_quasi_random_points_have_the_covariance_and_no_farther_ones_than_normal_noise(d, exponent):
+    covariance = covariance_of(d, 1)
+    points, weights = quasi_monte_carlo(covariance, exponent)
+    np.testing.assert_allclose(
+        (weights[:, None] * points).T @ points, covariance, atol=1e-10 * np.abs(covariance).max()
+    )
+    squared = np.sum(np.linalg.solve(np.linalg.cholesky(covariance), points.T) ** 2, axis=0)
+    assert squared.max() < chi2(d).isf(1e-4 if d < 16 else 0.2)
+    if d <= 3:  # where so many points can tell
+        assert np.quantile(squared, 0.9) == pytest.approx(chi2(d).isf(0.1), rel=0.2)

@@ -8,15 +8,16 @@ Legend (the thesis' symbols in brackets)
     s        number of points
     offsets  perturbations xi_i, (s, d)
     weights  w_i, (s,), summing to 1
-Every rule has mean 0 and, all but the last exactly, covariance S.
+Every rule has mean 0 and covariance S; quasi-random points of uniform noise, or of very many variables, its variances.
 """
 
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.defaults import QUASI_RANDOM_EXPONENT
+from surehold.defaults import QUASI_RANDOM_EXPONENT, SCRAMBLINGS
 from surehold.errors import InputError, unknown_name
 
 __all__ = [
@@ -170,27 +171,50 @@ def gauss_hermite(covariance: ArrayLike, order: int = 3, bounded: bool = False) 
 def quasi_monte_carlo(
     covariance: ArrayLike, exponent: int = QUASI_RANDOM_EXPONENT, bounded: bool = False
 ) -> Quadrature:
-    """Return 2**exponent equally weighted quasi-random points of N(0, covariance): a shifted Sobol sequence.
+    """Return 2**exponent equally weighted quasi-random points of N(0, covariance).
 
     Of uniform noise with that covariance where it is `bounded`.
 
     For spread and quantiles, which a handful of sigma points cannot give. Points come in pairs of opposite sign, so
-    that the mean is exactly 0. The shift is a quarter of the sequence's step: mirrored points lie between the others,
-    and along each variable all 2**exponent are different and, as shares of the noise, evenly spaced.
+    that the mean is exactly 0. Normal points have the covariance exactly, too, in up to half as many noisy variables as
+    there are points; others its variances.
     """
-    from scipy.special import ndtri
-    from scipy.stats import qmc
-
     noisy, root, d = _root(covariance)
     if len(noisy) == 0:
         return exact(d)
+    points = _standard_points(len(noisy), exponent, bounded)
+    offsets = np.zeros((len(points), d))
+    offsets[:, noisy] = points @ root.T
+    return Quadrature(offsets, np.full(len(points), 1.0 / len(points)))
+
+
+@lru_cache(maxsize=64)
+def _standard_points(r: int, exponent: int, bounded: bool) -> NDArray[np.float64]:
+    """Return quasi-random points (2**exponent, r) with unit variances, the second half the mirror image of the first.
+
+    Half are the cells of a scrambled Sobol sequence, a quarter of a cell from their border: mirrored points lie between
+    the others, and along each variable all are different and evenly spaced, as shares of the noise. Of several
+    scramblings the one with the least centered discrepancy is taken (Hickernell 1998): few points of an unscrambled
+    sequence crowd in corners, and some of its variables are nearly the same.
+    """
+    from scipy.linalg import solve_triangular
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
     half = 2 ** (exponent - 1)
-    uniform = qmc.Sobol(len(noisy), scramble=False).random_base2(exponent - 1) + 0.25 / half
-    normal = 2.0 * uniform - 1.0 if bounded else ndtri(uniform)
-    normal /= np.sqrt(np.mean(normal**2, axis=0))  # unit variance exactly, too
-    offsets = np.zeros((2 * half, d))
-    offsets[:, noisy] = np.concatenate([normal, -normal]) @ root.T
-    return Quadrature(offsets, np.full(2 * half, 0.5 / half))
+    few = r <= half
+
+    def mirrored(seed: int) -> NDArray[np.float64]:
+        cells = np.floor(half * qmc.Sobol(r, rng=seed).random_base2(exponent - 1))
+        return np.concatenate([cells + 0.25, half - cells - 0.25]) / half
+
+    shares = min((mirrored(seed) for seed in range(SCRAMBLINGS if few else 1)), key=qmc.discrepancy)
+    points = 2.0 * shares - 1.0 if bounded else ndtri(shares)
+    points /= np.sqrt(np.mean(points**2, axis=0))
+    if few and not bounded:
+        points = solve_triangular(np.linalg.cholesky(points.T @ points / len(points)), points.T, lower=True).T
+    points.flags.writeable = False
+    return points
 
 
 def _star(noisy: NDArray[np.intp], root: NDArray[np.float64], d: int, distance: float, center: float) -> Quadrature:
