@@ -3,8 +3,8 @@
     python -m benchmarks.rule_regret "nes-polynomial" "mvar-mixture"
     python -m benchmarks.rule_regret --family 200
 
-The measure of the true function is computed by 32 (the default), 64 (the default for the mean in up to three
-variables), 128 and 512 quasi-random perturbations, and maximized. Printed is what the place that comes out lacks to the
+The measure of the true function is computed by 32 (the default in four and more variables), 64 (the default in up to
+three), 128 and 512 quasi-random perturbations, and maximized. Printed is what the place that comes out lacks to the
 best one under the noise, exactly: on the published robust problems in per cent of the best value; with --family on so
 many training seeds of the generated landscapes, mean and standard error in per cent of their scale. No search by a rule
 can be expected to end nearer.

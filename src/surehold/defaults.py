@@ -39,8 +39,8 @@ SHORTLIST: Final = 16
 #: time whether there are a thousand or ten thousand. Never measured against other numbers; python -m benchmarks.growth.
 CONTENDERS: Final = 400
 #: The coarse ranking, and the choice of the ascents' starts, use every (m // 3)-th of the m particles: numbers 0, 3, 6
-#: and 9 of the default 10, which are four. It saves time: python -m benchmarks.suggestion_time. Its effect on the
-#: result was never measured.
+#: and 9 of the default 10, which are four; so does the whole search for the best risk measure. It saves time: python -m
+#: benchmarks.suggestion_time. Its effect on the result was never measured.
 SCREENING_DIVISOR: Final = 3
 
 # --- which improvements are worth a trial -----------------------------------------------------------------------------
@@ -93,14 +93,13 @@ JOINT_POINTS: Final = 512
 
 # --- quadratures of the input noise -----------------------------------------------------------------------------------
 
-#: Quasi-random points, as a power of two, by which outcomes are averaged; and their mean in a box of so few variables.
-#: What a rule alone loses: python -m benchmarks.rule_regret --family 100. With 64 points asks under noise take 1.5 times
-#: as long as with 32, those of a risk measure 2.7 times.
+#: Quasi-random points, as a power of two, by which outcomes are averaged; and those in a box of so few variables, where
+#: an ask takes 1.5 times as long with twice as many. What a rule alone loses: python -m benchmarks.rule_regret.
 QUASI_RANDOM_EXPONENT: Final = 5
 QUASI_RANDOM_EXPONENT_OF_FEW: Final = 6
 FEW_VARIABLES: Final = 3
 #: Scramblings of which the points with the least discrepancy are taken. Never measured against other numbers; the rule
-#: as it comes out: python -m benchmarks.rule_regret --family 100.
+#: as it comes out: python -m benchmarks.rule_regret.
 SCRAMBLINGS: Final = 64
 #: Representative conditions, of uncontrolled variables, by which candidates are screened. Never measured.
 COARSE_CONDITIONS: Final = 8

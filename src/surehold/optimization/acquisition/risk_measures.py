@@ -9,7 +9,6 @@ Legend
               taken off the model's mean
 """
 
-from copy import copy
 from dataclasses import dataclass
 from typing import Final
 
@@ -108,12 +107,6 @@ class RiskImprovement:
         self._risk = risk
         self._best = best
         self._normals = rng.standard_normal((RISK_DRAWS, len(perturbations.quadrature.weights)))
-
-    def thinned(self, count: int) -> "RiskImprovement":
-        """Return a cheaper approximation, by about `count` of the particles and the same draws."""
-        thinner = copy(self)
-        thinner._posterior = self._posterior.thinned(count)
-        return thinner
 
     def values(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return draws of the risk measure (m b, q) at U (q, d)."""

@@ -8,7 +8,8 @@ Legend (the thesis' symbols in brackets)
     s        number of points
     offsets  perturbations xi_i, (s, d)
     weights  w_i, (s,), summing to 1
-Every rule has mean 0 and covariance S; quasi-random points of uniform noise, or of very many variables, its variances.
+Every rule has mean 0 and covariance S; quasi-random points of uniform noise, or of very many variables, have its
+variances.
 """
 
 from functools import lru_cache

@@ -40,15 +40,15 @@ class RiskAverse:
         if self.trust_region is not None:
             regions = self.trust_region.within(regions, anchors[0], history.observed)
         d = anchors.shape[1]
+        searched = posterior.thinned(SCREENING_DIVISOR)
         if risk.name == "worst":
-            bound = WorstCaseBound(posterior, accurate, self.kappa)
+            bound = WorstCaseBound(searched, accurate, self.kappa)
             found = multistart(bound, bound, d, anchors, rng, regions, history.admission)
             if not len(found):
                 return found
             return np.concatenate([bound.weakest(found[0]), found])
-        improvement = RiskImprovement(posterior, accurate, risk, best, rng)
-        screen = improvement.thinned(SCREENING_DIVISOR)
-        found = multistart(improvement, screen, d, anchors, rng, regions, history.admission)
+        improvement = RiskImprovement(searched, accurate, risk, best, rng)
+        found = multistart(improvement, improvement, d, anchors, rng, regions, history.admission)
         if not len(found):
             return found
         return np.concatenate([where_to_look(posterior, found[0], accurate, self.ranking.coarse), found])
