@@ -89,16 +89,25 @@ def test_a_value_is_said_to_a_tenth_of_its_deviation(value, deviation, text):
     assert in_digits(value, deviation) == text
 
 
-def test_why_the_highest_is_refused_is_said_by_the_measure_that_decided():
+def refused_by_value_at_risk(seed):
     def spike(x):
         return 1.5 * np.exp(-0.5 * ((x[0] - 0.2) / 0.01) ** 2) + np.exp(-0.5 * ((x[0] - 0.7) / 0.1) ** 2)
 
     noise = sh.InputNoise.unit(0.03)
-    box = sh.Box({"x": (0.0, 1.0)})
-    refused = sh.maximize(spike, box, n_trials=25, input_noise=noise, risk="var", seed=1).recommendation.refused
+    found = sh.maximize(spike, sh.Box({"x": (0.0, 1.0)}), n_trials=25, input_noise=noise, risk="var", seed=seed)
+    return found.recommendation.refused
+
+
+def test_why_the_highest_is_refused_is_said_by_the_measure_that_decided():
+    refused = refused_by_value_at_risk(8)
     assert "its 'var' is" in refused
     of_highest, of_recommended = (float(number) for number in re.findall(r"(?:is|one) (-?[\d.]*\d)", refused)[-2:])
     assert of_highest < of_recommended
+
+
+def test_one_that_is_worth_as_much_by_the_measure_is_said_to_be():
+    """Both are on the broad hill, .0001 apart."""
+    assert "is worth no more than the recommended one: its 'var' is 0.8889, too" in refused_by_value_at_risk(1)
 
 
 def test_a_place_that_is_worth_as_much_is_no_worse():

@@ -242,7 +242,9 @@ def recommendation(
     elif np.any(np.abs(highest[0] - u) > 1e-6):
         other = execution_at(posterior, reached, highest[0], noise_variance)
         refused = f"The {best} observed trial gave {said(highest[1])}, but under the noise "
-        if by_risk is not None:
+        if by_risk is not None and said(by_risk[1]) == said(by_risk[2]):
+            refused += f"it is worth no more than the recommended one: its '{by_risk[0]}' is {said(by_risk[2])}, too."
+        elif by_risk is not None:
             refused += f"its '{by_risk[0]}' is {said(by_risk[1])}, that of the recommended one {said(by_risk[2])}."
         elif other.mean >= outcome.mean or said(other.mean) == said(outcome.mean):
             refused += f"it is worth no more than the recommended one: {said(outcome.mean)} is expected."

@@ -126,9 +126,20 @@ class Requirements:
             self._allowed += self.region.contains(new).tolist()
         return np.array(self._allowed, dtype=bool)
 
+    @property
+    def _enough(self) -> float:
+        """The share of the perturbations that has to keep all limits: `level`, and half of one more where there is one.
+
+        A search for the best value ends where the next perturbation is about to break a limit, and up to there, half of
+        what lies between the two, executions break it already.
+        """
+        weights = self._ranking.accurate.quadrature.weights
+        half = 0.0 if len(weights) == 1 else 0.5 * float(weights.max())
+        return max(self.level, min(self.level + half, 1.0 - half))
+
     def feasible(self, trials: Trials) -> NDArray[np.bool_]:
         """Tell which trials may become the answer, (t,)."""
-        found = trials.eligible & (self.feasibility(trials) >= self.level)
+        found = trials.eligible & (self.feasibility(trials) >= self._enough)
         model = self._where_it_fails(trials)
         if model is None or self._ranking.exact_inputs or not found.any():
             return found
@@ -289,7 +300,7 @@ class Requirements:
             least = float(np.minimum(np.log(self.level), np.log(SUCCESS_SHARE) + best))
 
         def feasible(U: NDArray[np.float64]) -> NDArray[np.bool_]:
-            found = execution_probability(outputs, self._ranking.accurate, U) >= self.level
+            found = execution_probability(outputs, self._ranking.accurate, U) >= self._enough
             return found if succeeds is None else found & (succeeds.log_probability(U)[0] >= least)
 
         return Admission(self.region, (), feasible if outputs or succeeds is not None else None)
