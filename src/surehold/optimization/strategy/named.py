@@ -65,7 +65,8 @@ def strategy_named(
         raise InputError(f"{what} needs input noise; give input_noise=.")
     default = "quasi_monte_carlo" if name.scale == "robust" or averse else "unscented"
     rule = default if quadrature is None else quadrature
-    exponent = QUASI_RANDOM_EXPONENT if box.dimension > FEW_VARIABLES else QUASI_RANDOM_EXPONENT_OF_FEW
+    few = box.dimension <= FEW_VARIABLES and risk.name != "worst"  # of more perturbations another one is the worst
+    exponent = QUASI_RANDOM_EXPONENT_OF_FEW if few else QUASI_RANDOM_EXPONENT
     accurate = Perturbations.of(input_noise, box, rule, border, k=k, exponent=exponent, allowed=allowed)
     risk.check_weights(accurate.quadrature.weights, rule)
     coarse = Perturbations.of(input_noise, box, "unscented", border, allowed=allowed)

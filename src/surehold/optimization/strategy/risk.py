@@ -40,14 +40,13 @@ class RiskAverse:
         if self.trust_region is not None:
             regions = self.trust_region.within(regions, anchors[0], history.observed)
         d = anchors.shape[1]
-        searched = posterior.thinned(SCREENING_DIVISOR)
         if risk.name == "worst":
-            bound = WorstCaseBound(searched, accurate, self.kappa)
+            bound = WorstCaseBound(posterior, accurate, self.kappa)
             found = multistart(bound, bound, d, anchors, rng, regions, history.admission)
             if not len(found):
                 return found
             return np.concatenate([bound.weakest(found[0]), found])
-        improvement = RiskImprovement(searched, accurate, risk, best, rng)
+        improvement = RiskImprovement(posterior.thinned(SCREENING_DIVISOR), accurate, risk, best, rng)
         found = multistart(improvement, improvement, d, anchors, rng, regions, history.admission)
         if not len(found):
             return found
