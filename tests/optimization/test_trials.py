@@ -166,7 +166,7 @@ def test_a_hand_that_strays_over_the_border_is_learnt_from(settings):
         reached = x + 0.003 * rng.standard_normal(2)
         outside += not BOX.contains(reached)
         optimizer.tell(x, ridge(reached), reached=reached)
-    assert outside > 2, "the test tests nothing"
+    assert outside >= 2, "the test tests nothing"
     assert len(optimizer.pending) == 0
     np.testing.assert_allclose(optimizer.predict(optimizer.reached)[0], optimizer.y, atol=0.05)
     for where in ("observed", "box"):
