@@ -162,6 +162,7 @@ def test_draws_of_many_queries_at_once_are_those_of_each_alone(learnt, clipped):
     together = learnt.sample(points, normals)
     alone = np.concatenate([learnt.sample(points[i : i + 1], normals) for i in range(5)], axis=1)
     np.testing.assert_allclose(together, alone, atol=1e-6)
+    assert learnt.sample(points[:0], normals).shape == (len(together), 0, 4, 6)
 
 
 def test_pending_trials_equal_a_refit_on_their_means(data):

@@ -170,6 +170,9 @@ def sample(P, normals, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha
     """
     m, n = alpha.shape
     q, s, d = P.shape
+    draws = np.empty((m, q, normals.shape[0], s))
+    if q == 0:
+        return draws
     alike = np.empty(q, dtype=np.bool_)
     for i in range(q):
         apart = 0.0
@@ -177,7 +180,6 @@ def sample(P, normals, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha
             for k in range(d):
                 apart = max(apart, abs((P[i, w, k] - P[i, 0, k]) - (P[0, w, k] - P[0, 0, k])))
         alike[i] = apart < _ALIKE
-    draws = np.empty((m, q, normals.shape[0], s))
     K = np.empty((n, s))
     first = np.empty((s, s))
     C = np.empty((s, s))
