@@ -158,7 +158,7 @@ STRAYING = {"noise_while_exploring": True, "input_noise": NOISE}
 
 @pytest.mark.parametrize("settings", [STRAYING, {"input_noise": NOISE}, {}])
 def test_a_hand_that_strays_over_the_border_is_learnt_from(settings):
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(1)
     optimizer = Optimizer(BOX, surrogate="gp", seed=0, **settings)
     outside = 0
     for _ in range(25):
@@ -166,7 +166,7 @@ def test_a_hand_that_strays_over_the_border_is_learnt_from(settings):
         reached = x + 0.003 * rng.standard_normal(2)
         outside += not BOX.contains(reached)
         optimizer.tell(x, ridge(reached), reached=reached)
-    assert outside >= 2, "the test tests nothing"
+    assert outside > 2, "the test tests nothing"
     assert len(optimizer.pending) == 0
     np.testing.assert_allclose(optimizer.predict(optimizer.reached)[0], optimizer.y, atol=0.05)
     for where in ("observed", "box"):

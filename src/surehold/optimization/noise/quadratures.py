@@ -211,9 +211,10 @@ def _standard_points(r: int, exponent: int, bounded: bool) -> NDArray[np.float64
 
     shares = min((mirrored(seed) for seed in range(SCRAMBLINGS if few else 1)), key=qmc.discrepancy)
     points = 2.0 * shares - 1.0 if bounded else ndtri(shares)
-    points /= np.sqrt(np.mean(points**2, axis=0))
     if few and not bounded:
         points = solve_triangular(np.linalg.cholesky(points.T @ points / len(points)), points.T, lower=True).T
+    else:
+        points /= np.sqrt(np.mean(points**2, axis=0))
     points.flags.writeable = False
     return points
 
