@@ -21,8 +21,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.polynomial.chebyshev import chebval
 from scipy.optimize import minimize
-from scipy.special import ndtri
-from scipy.stats import qmc
+from scipy.stats import norm, qmc
 
 import surehold as sh
 from benchmarks.generated_landscapes import landscape
@@ -60,7 +59,7 @@ def unscrambled(rule, noise, box):
     covariance = np.eye(box.dimension) if noise.varies else noise.unit_covariance(box)
     noisy = np.flatnonzero(np.diag(covariance) > 0.0)
     shares = qmc.Sobol(len(noisy), scramble=False).random(half) + 0.5 / half
-    points = 2.0 * shares - 1.0 if noise.bounded else ndtri(shares)
+    points = 2.0 * shares - 1.0 if noise.bounded else norm.ppf(shares)
     points /= np.sqrt(np.mean(points**2, axis=0))
     offsets = np.zeros((2 * half, box.dimension))
     offsets[:, noisy] = np.concatenate([points, -points]) @ root_of(covariance)[np.ix_(noisy, noisy)].T
