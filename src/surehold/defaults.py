@@ -35,6 +35,8 @@ ANCHORS: Final = 3
 #: coarse ranking need only place the best input among the first 16. Never measured on its own; what a quadrature's
 #: ranking loses: python -m benchmarks.quadrature_error.
 SHORTLIST: Final = 16
+#: Tried inputs, the best of these, between which a risk measure by more perturbations decides. Never measured.
+FINALISTS: Final = 8
 #: Of more tried inputs than this only those with the highest values are ranked by their outcome: an ask takes the same
 #: time whether there are a thousand or ten thousand. Never measured against other numbers; python -m benchmarks.growth.
 CONTENDERS: Final = 400

@@ -319,12 +319,12 @@ class Optimizer(Record):
                 allowed=ranking.accurate.allowed,
             )
             if where == "observed":
-                index = int(ranking.order(posterior, history.tried, history.observed)[0])
+                index = ranking.answer(posterior, history)
                 u, observed = history.tried[index], float(history.observed[index])
             else:
                 rng = self._rng(3, len(self._trials))
                 strict = None if self._requirements is None else self._requirements.strict(self._trials)
-                u, observed = self._snapped(ranking.best(posterior, history.tried, rng, reached, strict)), np.nan
+                u, observed = self._snapped(ranking.best(posterior, history.tried, rng, strict)), np.nan
             if self.box.uncontrolled is not None:
                 u = self.box.uncontrolled.at_mean(u)
             best = int(np.argmax(history.observed))

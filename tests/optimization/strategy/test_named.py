@@ -26,6 +26,26 @@ def named(criterion=None, risk="mean", noise=0.1, trust_region=None, thesis=None
     )
 
 
+@pytest.mark.parametrize(
+    ("settings", "finer"),
+    [
+        ({}, True),
+        ({"risk": "cvar"}, True),
+        ({"risk": "worst"}, False),
+        ({"noise": None}, False),
+        ({"criterion": "uei"}, False),
+        ({"quadrature": "quasi_monte_carlo"}, False),
+        ({"risk": "cvar", "quadrature": "unscented"}, False),
+    ],
+)
+def test_more_perturbations_decide_the_answer_where_they_are_ours_to_choose(settings, finer):
+    """Of the worst case among the perturbations more of them are another problem."""
+    ranking = named(**settings).strategy.ranking
+    assert (ranking.finer is not None) == finer
+    if finer:
+        assert len(ranking.finer.quadrature.weights) > len(ranking.accurate.quadrature.weights)
+
+
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_every_criterion_has_its_strategy_and_covers_where_it_is_stalled(criterion):
     strategy = named(criterion)

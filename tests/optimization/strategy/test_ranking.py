@@ -7,7 +7,7 @@ import pytest
 
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.noise.quadratures import exact, quasi_monte_carlo, sigma_points
+from surehold.optimization.noise.quadratures import Quadrature, exact, quasi_monte_carlo, sigma_points
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 
@@ -32,9 +32,9 @@ def posterior():
     return GaussianProcess().fit(TRIED, f(TRIED)).posterior
 
 
-def ranking_of(risk="mean", noisy=False, screened=True):
+def ranking_of(risk="mean", noisy=False, screened=True, finer=None):
     accurate, coarse = Perturbations(quasi_monte_carlo(S)), Perturbations(sigma_points(S))
-    return Ranking(accurate, coarse, Risk(risk), noisy, screened)
+    return Ranking(accurate, coarse, Risk(risk), noisy, screened, finer)
 
 
 def outcome(posterior, U, risk="mean"):
@@ -52,6 +52,31 @@ def test_the_best_tried_input_comes_first(risk, screened, posterior):
     assert order[0] == np.argmax(outcome(posterior, TRIED, risk))
 
 
+def test_an_input_that_is_best_by_the_risk_only_is_found_among_many_that_are_better_in_the_mean():
+    """The first choice is by the measure, too: by the mean 24 inputs on the steep hill are better."""
+    tried = np.concatenate([np.linspace(0.238, 0.262, 24), [0.02, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]])[:, None]
+    posterior = GaussianProcess().fit(tried, f(tried)).posterior
+    assert np.argsort(-outcome(posterior, tried))[24] == np.argmax(outcome(posterior, tried, "cvar")) == 28
+    assert ranking_of("cvar").order(posterior, tried)[0] == 28
+
+
+@pytest.mark.parametrize(("risk", "decided"), [("mean", False), ("mean-std", True), ("cvar", True)])
+def test_the_answer_by_a_risk_measure_is_that_of_the_finer_perturbations(risk, decided):
+    """Perturbations to one side only put it to the other one, and of the mean they decide."""
+    tried = np.linspace(0.0, 1.0, 26)[:, None]
+    posterior, history = GaussianProcess().fit(tried, f(tried)).posterior, History(tried, f(tried), NONE, NONE)
+    one_sided = Perturbations(Quadrature(np.array([[0.0], [0.12]]), np.full(2, 0.5)))
+    alone, answer = (
+        Ranking(one_sided, one_sided, Risk(risk), False, finer=finer).answer(posterior, history)
+        for finer in (None, FINER)
+    )
+    if not decided:
+        assert answer == alone
+        return
+    lost = outcome(posterior, tried, risk).max() - outcome(posterior, tried, risk)
+    assert lost[answer] < 0.02 < lost[alone]
+
+
 def test_observed_values_decide_where_nothing_is_uncertain(posterior):
     points = Perturbations(exact(1))
     values = np.random.default_rng(1).random(len(TRIED))  # other values than the model's
@@ -64,7 +89,7 @@ def test_observed_values_decide_where_nothing_is_uncertain(posterior):
 @pytest.mark.parametrize("risk", ["mean", "mean-std", "cvar", "worst"])
 def test_the_best_input_of_the_box(risk, posterior):
     """With a risk measure the best tried input came back: everything counted as an infinite improvement."""
-    best = ranking_of(risk).best(posterior, TRIED, np.random.default_rng(0), FINER)
+    best = ranking_of(risk, finer=FINER).best(posterior, TRIED, np.random.default_rng(0))
     values = outcome(posterior, GRID, risk)
     found = outcome(posterior, best[None, :], risk)[0]
     assert found > values.max() - 0.02 * np.ptp(values)
@@ -74,8 +99,10 @@ def test_the_best_input_of_the_box(risk, posterior):
 def test_the_best_input_of_the_box_is_that_of_the_finer_perturbations(posterior):
     """Four perturbations alone put it elsewhere: their average is highest beside the best place."""
     few = Perturbations(quasi_monte_carlo(S, 2))
-    ranking = Ranking(few, few, Risk(), False)
-    best, alone = (ranking.best(posterior, TRIED, np.random.default_rng(0), points) for points in (FINER, few))
+    best, alone = (
+        Ranking(few, few, Risk(), False, finer=finer).best(posterior, TRIED, np.random.default_rng(0))
+        for finer in (FINER, None)
+    )
     values = outcome(posterior, GRID)
     assert outcome(posterior, best[None, :])[0] > values.max() - 1e-3 * np.ptp(values)
     assert abs(alone - best) > 3.0 * abs(GRID[np.argmax(values)] - best)

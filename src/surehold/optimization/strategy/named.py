@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from surehold.defaults import FEW_VARIABLES, QUASI_RANDOM_EXPONENT, QUASI_RANDOM_EXPONENT_OF_FEW
+from surehold.defaults import FEW_VARIABLES, OUTCOME_EXPONENT, QUASI_RANDOM_EXPONENT, QUASI_RANDOM_EXPONENT_OF_FEW
 from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.acquisition.scales import criterion_name
@@ -70,7 +70,10 @@ def strategy_named(
     accurate = Perturbations.of(input_noise, box, rule, border, k=k, exponent=exponent, allowed=allowed)
     risk.check_weights(accurate.quadrature.weights, rule)
     coarse = Perturbations.of(input_noise, box, "unscented", border, allowed=allowed)
-    ranking = Ranking(accurate, coarse, risk, noisy, screened=thesis is None)
+    finer = None
+    if quadrature is None and rule == "quasi_monte_carlo" and risk.name != "worst" and shaken:
+        finer = Perturbations.of(input_noise, box, rule, border, exponent=OUTCOME_EXPONENT, allowed=allowed)
+    ranking = Ranking(accurate, coarse, risk, noisy, thesis is None, finer)
     if thesis is not None:
         for setting, given in (
             (f"risk='{risk.name}'", averse),

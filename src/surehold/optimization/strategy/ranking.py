@@ -4,6 +4,7 @@ Legend
     U         points of the unit cube, (q, d)
     accurate  quadrature by which outcomes under the input noise are computed
     coarse    sigma points: cheap, good enough to choose the inputs that are ranked again
+    finer     quadrature with more points than the accurate one: too dear for a search, not for its answer
     outcome   UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over perturbations i and particles j     thesis (3.21)
 """
 
@@ -13,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import ANCHORS, CONTENDERS, SCREENING_DIVISOR, SHORTLIST
+from surehold.defaults import ANCHORS, CONTENDERS, FINALISTS, SCREENING_DIVISOR, SHORTLIST
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
 from surehold.optimization.acquisition.scales import Acquisition, CriterionName, Scale
 from surehold.optimization.constraints.admission import Admission
@@ -62,6 +63,8 @@ class Ranking:
     """whether observations carry noise, so that the highest one is no incumbent"""
     screened: bool = True
     """whether the coarse perturbations and a part of the particles choose which inputs are ranked accurately"""
+    finer: Perturbations | None = None
+    """what decides between the best of them; None: the accurate ones, too"""
     _last: list[tuple[Posterior, NDArray[np.float64], NDArray[np.intp]]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
@@ -81,44 +84,44 @@ class Ranking:
             by_value = _latest_of_equals(observed)
             likely = by_value[:CONTENDERS]
             return np.concatenate([likely[self.order(posterior, U[likely])], by_value[CONTENDERS:]])
-        if self.screened:
-            first = _outcomes(posterior.thinned(SCREENING_DIVISOR), self.coarse, U)
-        else:
-            first = _outcomes(posterior, self.accurate, U)
+        first = self._screening(posterior, U) if self.screened else self._measure(posterior, self.accurate, U)
         order = np.argsort(-first, kind="stable")
         top = order[:SHORTLIST]
-        if self.risk.name == "mean":
-            values = _outcomes(posterior, self.accurate, U[top])
-        else:
-            values = self.risk_at(posterior, U[top])
-        order[:SHORTLIST] = top[np.argsort(-values, kind="stable")]
+        order[:SHORTLIST] = top[np.argsort(-self._measure(posterior, self.accurate, U[top]), kind="stable")]
         return order
+
+    def answer(self, posterior: Posterior, history: History) -> int:
+        """Return the number of the tried input that is best; of those that `order` puts first, the finer decide."""
+        order = self.order(posterior, history.tried, history.observed)
+        if self.finer is None or self.risk.name == "mean":
+            return int(order[0])
+        return int(order[np.argmax(self._finest(posterior, history.tried[order[:FINALISTS]]))])
 
     def best(
         self,
         posterior: Posterior,
         tried: NDArray[np.float64],
         rng: np.random.Generator,
-        finer: Perturbations,
         admission: Admission | None = None,
     ) -> NDArray[np.float64]:
         """Return the point of the cube (d,) with the best modelled outcome; `tried` (n, d) guide the search.
 
-        By the mean, the best of those found climb on by the `finer` perturbations, which decide: an average over few of
-        them is highest a little beside the best place.
+        The best of those found climb on by the finer perturbations, which decide: a measure by few of them is highest a
+        little beside the best place.
         """
         anchors = tried[self.order(posterior, tried)[:ANCHORS]]
+        last = self.accurate if self.finer is None else self.finer
         if self.risk.name == "mean":
-            objective, screen = (_mean_outcome(posterior, points) for points in (self.accurate, self.coarse))
+            objective, screen, last = (_mean_outcome(posterior, rule) for rule in (self.accurate, self.coarse, last))
         else:
-            objective = screen = self._measured(posterior)
+            searched = self._searched(posterior)
+            objective = screen = self._measured(searched, self.accurate)
+            last = self._measured(searched, last)
         found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, admission)
         candidates = np.concatenate([anchors[:1], found[:ANCHORS]])
-        if self.risk.name != "mean" or self.exact_inputs or admission is not None:
-            return candidates[self.order(posterior, candidates)[0]]
-        whole = np.zeros_like(candidates), np.ones_like(candidates)
-        tops, values = climb(_mean_outcome(posterior, finer), candidates, *whole)
-        return tops[int(np.argmax(values))]
+        if self.finer is not None and admission is None:
+            candidates, _ = climb(last, candidates, np.zeros_like(candidates), np.ones_like(candidates))
+        return candidates[np.argmax(self._finest(posterior, candidates))]
 
     def trials(self, posterior: Posterior, history: History, exactly: bool) -> NDArray[np.intp]:
         """Return the indices of the tried inputs, best first; `exactly`: as if there were no input noise."""
@@ -133,7 +136,7 @@ class Ranking:
             return float(values.max()), history.tried[np.argsort(-values, kind="stable")[:ANCHORS]]
         anchors = history.tried[self._order_of_tried(posterior, history)[:ANCHORS]]
         if self.risk.name != "mean":
-            return float(self.risk_at(posterior, anchors[:1])[0]), anchors
+            return float(self._measure(posterior, self.accurate, anchors[:1])[0]), anchors
         best = self.accurate.outcome(posterior, anchors[:1]).mean  # (m, 1)
         return best if scale == "robust" else float(best.mean()), anchors
 
@@ -143,14 +146,10 @@ class Ranking:
         Without it a second trial would be sent to the top on which the first one is on its way.
         """
         if self.risk.name != "mean":
-            return self.risk_at(posterior, pending).max()
+            return self._measure(posterior, self.accurate, pending).max()
         perturbations = Perturbations(exact(pending.shape[1])) if scale == "exact" else self.accurate
         mean = perturbations.outcome(posterior, pending).mean  # (m, p)
         return mean.mean(axis=0).max() if scale == "unscented" else mean.max(axis=1, keepdims=True)
-
-    def risk_at(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the expected risk measure (q,) at U (q, d)."""
-        return self._measured(posterior).expectation(U)
 
     def judged(
         self, posterior: Posterior, one: NDArray[np.float64], other: NDArray[np.float64]
@@ -158,16 +157,42 @@ class Ranking:
         """Return the name of the risk measure and what it is at two points (d,); None where the mean decides."""
         if self.risk.name == "mean" or self.exact_inputs:
             return None
-        return self.risk.name, *self.risk_at(posterior, np.array([one, other])).tolist()
+        return self.risk.name, *self._finest(posterior, np.array([one, other])).tolist()
 
     @property
     def exact_inputs(self) -> bool:
         """Whether inputs are reached exactly."""
         return len(self.accurate.quadrature.weights) == 1
 
-    def _measured(self, posterior: Posterior) -> RiskImprovement:
+    def _measured(self, posterior: Posterior, perturbations: Perturbations) -> RiskImprovement:
         # The same draws at every call: the ranking must not depend on how often it was asked for.
-        return RiskImprovement(posterior, self.accurate, self.risk, None, np.random.default_rng(0))
+        return RiskImprovement(posterior, perturbations, self.risk, None, np.random.default_rng(0))
+
+    def _measure(
+        self, posterior: Posterior, perturbations: Perturbations, U: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the expected measure (q,) at U (q, d), the mean or a risk measure."""
+        if self.risk.name == "mean":
+            return perturbations.outcome(posterior, U).mean.mean(axis=0)
+        return self._measured(posterior, perturbations).expectation(U)
+
+    def _finest(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the expected measure (q,) at the few inputs U (q, d) between which the answer is chosen."""
+        if self.finer is None:
+            return self._measure(posterior, self.accurate, U)
+        return self._measure(self._searched(posterior), self.finer, U)
+
+    def _searched(self, posterior: Posterior) -> Posterior:
+        """Return the particles by which is searched: of a risk measure a part of them."""
+        return posterior if self.risk.name in ("mean", "worst") else posterior.thinned(SCREENING_DIVISOR)
+
+    def _screening(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return about what `_measure` does: of what a part of the particles expects at the coarse perturbations."""
+        few = posterior.thinned(SCREENING_DIVISOR)
+        if self.risk.name == "mean":
+            return self.coarse.outcome(few, U).mean.mean(axis=0)
+        moments, _ = self.coarse.spread(few, U)
+        return self.risk.measure(moments.mean.mean(axis=0).reshape(len(U), -1), self.coarse.quadrature.weights)
 
     def _order_of_tried(self, posterior: Posterior, history: History) -> NDArray[np.intp]:
         for known, tried, order in self._last:
@@ -203,7 +228,3 @@ def _latest_of_equals(values: NDArray[np.float64]) -> NDArray[np.intp]:
 
 def _mean_outcome(posterior: Posterior, perturbations: Perturbations) -> Acquisition:
     return Acquisition(posterior, CriterionName("ucb", "robust"), perturbations, 0.0, kappa=0.0)
-
-
-def _outcomes(posterior: Posterior, perturbations: Perturbations, U: NDArray[np.float64]) -> NDArray[np.float64]:
-    return perturbations.outcome(posterior, U).mean.mean(axis=0)
