@@ -105,7 +105,9 @@ FEW_VARIABLES: Final = 3
 SCRAMBLINGS: Final = 64
 #: Representative conditions, of uncontrolled variables, by which candidates are screened. Never measured.
 COARSE_CONDITIONS: Final = 8
-#: The same for the description of the recommended input: quantiles need more points than means. Never measured.
+#: Quasi-random points, as a power of two, for the answer under a risk measure, for the last climb of an answer anywhere
+#: in the box, and for the description of either: quantiles need more points than means. What is lost by the rule alone:
+#: python -m benchmarks.rule_regret.
 OUTCOME_EXPONENT: Final = 7
 
 # --- the maximizer of the acquisition function ------------------------------------------------------------------------
