@@ -98,6 +98,23 @@ def test_offsets_of_each_query(data, learnt):
             np.testing.assert_allclose(one[:, 0], all_[:, i], atol=1e-9)
 
 
+def test_what_is_remembered_of_perturbations_is_of_these_alone(data, learnt):
+    Q, weights = data[2], np.array([0.5, 0.3, 0.2])
+    near, far = (scale * np.random.default_rng(3).standard_normal((3, 2)) for scale in (0.1, 0.2))
+    asked = [
+        (offsets, weights if order > 0 else weights[::-1].copy(), gradient, slopes)
+        for offsets in (near, far)
+        for order in (1, -1)
+        for gradient in (False, True)
+        for slopes in (None, np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]))
+    ]
+    for offsets, w, gradient, slopes in [*asked, *asked[::-1]]:
+        found = learnt.average(Q, offsets, w, gradient, slopes)
+        own = [None if part is None else np.tile(part, (len(Q), 1, 1)) for part in (offsets, slopes)]
+        for one, other in zip(found, learnt.average(Q, own[0], w, gradient, own[1]), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_gradients(kernel, data):
     X, y, Q = data

@@ -19,7 +19,12 @@ from surehold.errors import SureholdError
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import Hyperparameters
-from surehold.optimization.surrogates.gaussian_process.prediction import average, factorize, sample
+from surehold.optimization.surrogates.gaussian_process.prediction import (
+    average,
+    factorize,
+    prior_variance,
+    sample,
+)
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Regions
 from surehold.store.kernels import njit
 
@@ -193,6 +198,7 @@ def average_by_neighbors(
     mean_gradient = np.empty((m, q if gradient else 0, d))
     variance_gradient = np.empty((m, q if gradient else 0, d))
     last = offsets.shape[0] - 1
+    prior, prior_gradient = prior_variance(offsets, slopes, weights, inverse_l, s2, mean_variance, kernel, gradient)
     for i in range(q):
         k = counts[i]
         near = np.empty((k, d))
@@ -216,6 +222,7 @@ def average_by_neighbors(
             offsets[b : b + 1],
             slopes[b : b + 1],
             weights,
+            (prior[:, b : b + 1], prior_gradient[:, b : b + 1]),
             near,
             inverse_l,
             s2,

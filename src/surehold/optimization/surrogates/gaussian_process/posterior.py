@@ -14,7 +14,13 @@ from surehold.errors import SureholdError
 from surehold.optimization.surrogates.gaussian_process.kernels import shape_size
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
-from surehold.optimization.surrogates.gaussian_process.prediction import average, factorize, sample
+from surehold.optimization.surrogates.gaussian_process.prediction import (
+    average,
+    factorize,
+    prior_variance,
+    sample,
+)
+from surehold.optimization.surrogates.memory import Remembered
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Regions
 
 __all__ = ["GaussianProcessPosterior", "Hyperparameters"]
@@ -85,6 +91,7 @@ class GaussianProcessPosterior:
         self.factors: Final = factors or self._factorized()
         self.diagnostics: Final = FitDiagnostics(n, cost, self.factors.repaired, outputs.flat)
         self.regions: Final = Regions.whole(d)
+        self._priors: Final = Remembered[tuple[NDArray[np.float64], NDArray[np.float64]]]()
 
     def _factorized(self) -> Factors:
         evidence = self.evidence
@@ -135,16 +142,28 @@ class GaussianProcessPosterior:
         the derivatives of query + offset by the query, coordinate by coordinate.
         """
         shape = (-1, *offsets.shape[-2:])
-        mean, variance, mean_gradient, variance_gradient = average(
-            np.ascontiguousarray(queries),
+        steps = (
             np.ascontiguousarray(offsets).reshape(shape),
             np.ascontiguousarray(np.ones_like(offsets) if slopes is None else slopes).reshape(shape),
             np.ascontiguousarray(weights),
-            self.evidence.X,
+        )
+        kernel = (
             self.hyperparameters.inverse_l,
             self.hyperparameters.s2,
             self.evidence.mean_variance,
             self.evidence.kernel,
+        )
+        if offsets.ndim == 2:  # the same for every query, and for those of the next call
+            key = repr((shape, gradient)).encode() + b"".join(part.tobytes() for part in steps)
+            prior = self._priors.value(key, lambda: prior_variance(*steps, *kernel, gradient))
+        else:
+            prior = prior_variance(*steps, *kernel, gradient)
+        mean, variance, mean_gradient, variance_gradient = average(
+            np.ascontiguousarray(queries),
+            *steps,
+            prior,
+            self.evidence.X,
+            *kernel,
             self.factors.inverse_L,
             self.factors.alpha,
             gradient,

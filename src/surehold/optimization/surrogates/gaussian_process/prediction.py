@@ -10,7 +10,8 @@ Legend (the thesis' symbols in brackets)
 
 A weighted sum of function values, sum_i w_i f(x + xi_i), is itself Gaussian under each particle: its covariance with
 the data is sum_i w_i k_j(x + xi_i, X) and its prior variance sum_ij w_i w_j k_j(xi_i, xi_j). With one offset of 0 that
-is f(x) itself, so one compiled function serves both.
+is f(x) itself, so one compiled function serves both. The prior variance hangs on the perturbations alone: whoever asks
+for many queries computes it once.
 """
 
 import numpy as np
@@ -26,7 +27,6 @@ from surehold.optimization.numerics.triangular import (
 )
 from surehold.optimization.surrogates.gaussian_process.kernels import (
     along,
-    correlation_and_factor,
     correlations,
     correlations_and_factors,
     cross_correlation,
@@ -35,7 +35,7 @@ from surehold.optimization.surrogates.gaussian_process.kernels import (
 from surehold.optimization.surrogates.gaussian_process.likelihood import data_covariance
 from surehold.store.kernels import njit
 
-__all__ = ["average", "factorize", "sample"]
+__all__ = ["average", "factorize", "prior_variance", "sample"]
 
 _LARGEST_REPAIR = 1e-2  # nugget ratio beyond which a factorization is given up
 _ALIKE = 1e-12  # box widths between perturbations that differ by rounding only
@@ -91,11 +91,51 @@ def _slopes(kernel, factor, z, Z, k, scale, first, second):
 
 
 @njit(cache=True)
-def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha, gradient):
+def prior_variance(offsets, slopes, weights, inverse_l, s2, mean_variance, kernel, gradient):
+    """Return the prior variance (m, b) of the weighted sums and its gradient (m, b, d), for offsets, slopes (b, s, d).
+
+    Of each pair of perturbations one order is computed: they are as many as s (s + 1) / 2.
+    """
+    m = inverse_l.shape[0]
+    b, s, d = offsets.shape
+    variance = np.empty((m, b))
+    variance_gradient = np.zeros((m, b if gradient else 0, d))
+    own = np.empty((s, s))
+    own_factor = np.empty((s, s))
+    for i in range(b):
+        xi = offsets[i]
+        Z = transposed(xi)
+        for j in range(m):
+            for w in range(s):
+                if gradient:
+                    correlations_and_factors(kernel, xi[w], Z, inverse_l[j], own[w, : w + 1], own_factor[w, : w + 1])
+                else:
+                    correlations(kernel, xi[w], Z, inverse_l[j], own[w, : w + 1])
+                for o in range(w):
+                    own[o, w] = own[w, o]
+            prior = 0.0
+            for w in range(s):
+                for o in range(s):
+                    prior += weights[w] * weights[o] * (s2[j] * own[w, o] + mean_variance)
+            variance[j, i] = prior
+            if gradient:
+                for k in range(d):
+                    t = 0.0
+                    for w in range(s):
+                        for o in range(w):
+                            step = xi[w, k] - xi[o, k]
+                            step *= (slopes[i, w, k] - slopes[i, o, k]) * along(kernel, step, inverse_l[j, k])
+                            t -= 2.0 * weights[w] * weights[o] * own_factor[w, o] * step
+                    variance_gradient[j, i, k] = s2[j] * t * inverse_l[j, k] ** 2
+    return variance, variance_gradient
+
+
+@njit(cache=True)
+def average(Q, offsets, slopes, weights, prior, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha, gradient):
     """Return mean, variance (m, q) and their gradients (m, q, d) of the weighted sums at Q (q, d).
 
     offsets (b, s, d): the same perturbations for every query (b = 1) or its own for each (b = q); slopes (b, s, d):
-    derivative of each coordinate of query + offset by that coordinate of the query.
+    derivative of each coordinate of query + offset by that coordinate of the query; prior: `prior_variance` of these.
     """
     m, n = alpha.shape
     q, d = Q.shape
@@ -115,27 +155,13 @@ def average(Q, offsets, slopes, weights, X, inverse_l, s2, mean_variance, kernel
     F = np.empty((q if gradient else 0, s, n))
     K, V = np.empty((q, n)), np.empty((q, n))
     W = np.empty((q if gradient else 0, n))
-    own = np.empty((s, s))
-    own_factor = np.empty((s, s))
     shift = mean_variance * weights.sum()
     for j in range(m):
-        for b in range(offsets.shape[0]):
-            xi = offsets[b]
-            correlation_and_factor(kernel, xi, xi, inverse_l[j], own, own_factor)
-            prior = 0.0
-            for w in range(s):
-                for o in range(s):
-                    prior += weights[w] * weights[o] * (s2[j] * own[w, o] + mean_variance)
-            variance[j, b:] = prior
+        for i in range(q):
+            variance[j, i] = prior[0][j, min(i, last)]
             if gradient:
                 for k in range(d):
-                    t = 0.0
-                    for w in range(s):
-                        for o in range(s):
-                            step = xi[w, k] - xi[o, k]
-                            step *= (slopes[b, w, k] - slopes[b, o, k]) * along(kernel, step, inverse_l[j, k])
-                            t -= weights[w] * weights[o] * own_factor[w, o] * step
-                    variance_gradient[j, b:, k] = s2[j] * t * inverse_l[j, k] ** 2
+                    variance_gradient[j, i, k] = prior[1][j, min(i, last), k]
         K[:] = shift
         for i in range(q):
             for w in range(s):

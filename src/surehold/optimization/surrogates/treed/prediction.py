@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
-from surehold.optimization.surrogates.gaussian_process.prediction import average
+from surehold.optimization.surrogates.gaussian_process.prediction import average, prior_variance
 from surehold.store.kernels import njit
 
 __all__ = ["LeafTable", "average_in_leaves"]
@@ -151,6 +151,7 @@ def average_in_leaves(Q, offsets, slopes, weights, home, table, gradient):
             xi,
             tilt,
             share,
+            prior_variance(xi, tilt, share, inverse_l[leaf], s2[leaf], mean_variance, kernel, gradient),
             X[first[leaf] : first[leaf + 1]],
             inverse_l[leaf],
             s2[leaf],
