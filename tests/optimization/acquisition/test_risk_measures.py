@@ -268,7 +268,41 @@ def test_worst_case_bound(known, unsure):
         upper = [(m.mean[0] + kappa * np.sqrt(m.variance[0])).min() for m in moments]
         np.testing.assert_allclose(bound(U), upper, atol=1e-9)
         lower = moments[0].mean[0] - kappa * np.sqrt(moments[0].variance[0])
-        np.testing.assert_allclose(bound.weakest(U[0]), points[0][np.argsort(lower)], atol=1e-12)
+        np.testing.assert_allclose(bound.to_try(U[0])[-len(lower) :], points[0][np.argsort(lower)], atol=1e-12)
+
+
+@pytest.mark.parametrize(("tried", "first"), [([0.3, 0.7], 0.5), ([0.5, 0.7], 0.3), ([0.2, 0.5, 0.8], 0.3)])
+def test_the_place_itself_is_tried_once_the_point_that_threatens_it_is_known(tried, first):
+    X = np.array(tried)[:, None]
+    posterior = GaussianProcess(length_scales=[0.2], signal_variance=1.0).fit(X, 2.0 * X[:, 0]).posterior
+    ends = Perturbations(Quadrature(np.array([[-0.2], [0.2]]), np.array([0.5, 0.5])))
+    points = WorstCaseBound(posterior, ends, 0.0).to_try(np.array([0.5]))
+    assert points[0, 0] == pytest.approx(first)
+    assert {0.3, 0.7} <= set(points.ravel().round(12))
+
+
+def test_values_of_uncontrolled_variables_are_no_place_to_try():
+    X = np.array([[0.3, 0.5], [0.7, 0.5]])
+    posterior = GaussianProcess(length_scales=[0.2, 0.2], signal_variance=1.0).fit(X, X[:, 0]).posterior
+    held = Perturbations(
+        Quadrature(np.array([[-0.2, 0.5], [0.2, 0.5]]), np.array([0.5, 0.5])), held=np.array([0, 1]) > 0
+    )
+    u = np.array([0.5, 0.9])
+    assert sorted(WorstCaseBound(posterior, held, 0.0).to_try(u).round(12).tolist()) == X.tolist()
+
+
+def test_the_best_place_under_the_worst_case_is_among_the_trials():
+    """The lower of two hills is the better one within 0.1; what is tried is not only the ends of what is reached."""
+
+    def f(x):
+        return float(1.2 * np.exp(-0.5 * ((x[0] - 0.25) / 0.04) ** 2) + np.exp(-0.5 * ((x[0] - 0.7) / 0.15) ** 2))
+
+    noise = sh.InputNoise.uniform({"x1": 0.1})
+    optimizer = sh.Optimizer(sh.Box.unit(1), input_noise=noise, risk="worst", n_initial=6, seed=0)
+    for _ in range(24):
+        x = optimizer.ask()
+        optimizer.tell(x, f(x))
+    assert float(optimizer.recommend().x[0]) == pytest.approx(float(optimizer.recommend("box").x[0]), abs=2e-3)
 
 
 @pytest.mark.parametrize(("name", "surrogate"), [*((name, "gp") for name in RISKS), ("cvar", "tgp")])

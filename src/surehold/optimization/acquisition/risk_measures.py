@@ -19,7 +19,7 @@ from surehold.defaults import RISK_DRAWS
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.numerics.differences import by_differences
-from surehold.optimization.surrogates.protocol import Posterior
+from surehold.optimization.surrogates.protocol import Posterior, mixture
 
 __all__ = ["RISKS", "Risk", "RiskImprovement", "WorstCaseBound"]
 
@@ -153,14 +153,26 @@ class WorstCaseBound:
         """Return the bounds (q,) and their gradients (q, d) at U (q, d), by central differences."""
         return by_differences(self, U)
 
-    def weakest(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the perturbed points (s, d) of u (d,), inside the cube, the one with the lowest lower bound first."""
-        points = self._perturbations.around(u[None, :])[0]
-        lower = self._bounds(u[None, :], -self._kappa)[0]
-        return np.clip(points[np.argsort(lower, kind="stable")], 0.0, 1.0)
+    def to_try(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the points of the cube (c, d) to try for the candidate u (d,), best first.
+
+        These are its perturbed points, the one with the lowest lower bound first (StableOpt). Where that one is better
+        known than u, nothing is to be learnt from it, and u itself is first: answers are inputs that were tried, and
+        the best place lies between the points that threaten it.
+        """
+        points = np.clip(self._perturbations.around(u[None, :])[0], 0.0, 1.0)
+        mean, std = self._known(points)
+        order = np.argsort(mean - self._kappa * std, kind="stable")
+        if self._perturbations.held is None and std[order[0]] < self._known(u[None, :])[1][0]:
+            return np.vstack([u, points[order]])
+        return points[order]  # of uncontrolled variables the candidate's own values mean nothing
 
     def _bounds(self, U: NDArray[np.float64], kappa: float) -> NDArray[np.float64]:
-        moments, _ = self._perturbations.spread(self._posterior, U)
-        mean = moments.mean.mean(axis=0)
-        variance = moments.variance.mean(axis=0) + moments.mean.var(axis=0)
-        return (mean + kappa * np.sqrt(variance)).reshape(len(U), -1)
+        points = self._perturbations.around(U)
+        mean, std = self._known(points.reshape(-1, U.shape[1]))
+        return (mean + kappa * std).reshape(len(U), -1)
+
+    def _known(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean and standard deviation (q,) of f at points (q, d)."""
+        mean, variance = mixture(self._posterior.moments(points))
+        return mean, np.sqrt(variance)

@@ -45,7 +45,7 @@ class RiskAverse:
             found = multistart(bound, bound, d, anchors, rng, regions, history.admission)
             if not len(found):
                 return found
-            return np.concatenate([bound.weakest(found[0]), found])
+            return np.concatenate([bound.to_try(found[0]), found])
         improvement = RiskImprovement(posterior.thinned(SCREENING_DIVISOR), accurate, risk, best, rng)
         found = multistart(improvement, improvement, d, anchors, rng, regions, history.admission)
         if not len(found):
