@@ -137,3 +137,13 @@ def test_a_short_part_without_a_share_changes_no_bit(points):
     X, Q, scales = points
     plain = correlation("matern52", X, Q, scales)
     np.testing.assert_array_equal(correlation("matern52_two_scales", X, Q, scales, PROPORTION, 1e-21), plain)
+
+
+def test_neither_share_nor_proportion_is_the_squared_exponential_bit_for_bit(points):
+    X, Q, scales = points
+    found, expected = np.empty((2, 2, len(X), len(Q)))
+    inverse = 1.0 / scales
+    correlation_and_factor(kernel_number("matern52_two_scales"), X, Q, np.append(inverse, (0.0, 0.0)), *found)
+    correlation_and_factor(kernel_number("squared_exponential"), X, Q, inverse, *expected)
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(correlation("matern52_two_scales", X, Q, scales, 1e-21, 1e-21), expected[0])

@@ -1,13 +1,18 @@
-"""Learning whether a response has one scale or two."""
+"""Learning whether a response has one scale or two, and whether one scale is rough or smooth."""
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal, norm
 from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern
 
-from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, log_evidence_and_root, mode
+from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
+    Learning,
+    log_evidence_and_root,
+    mode,
+    shared_out,
+)
 from surehold.optimization.surrogates.gaussian_process.kernels import correlation, kernel_number
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
@@ -28,18 +33,36 @@ def trials(f, n=60, seed=0):
     return X, f(X)
 
 
-def shares_of(f):
-    """Return the share w of the short part in each particle, 0 where there is none."""
-    posterior = GaussianProcess(kernel="matern52_two_scales", mean_variance=1.0).fit(*trials(f)).posterior
-    return posterior.hyperparameters.inverse_l[:, -1]
+def drawn(kernel, seed):
+    """Return a function that draws its values at X from a process of one scale."""
+
+    def f(X):
+        K = correlation(kernel, X, X, np.full(2, 0.3)) + 1e-10 * np.eye(len(X))
+        return np.linalg.cholesky(K) @ np.random.default_rng(seed + 100).standard_normal(len(X))
+
+    return f
 
 
-def test_a_smooth_function_has_one_scale():
-    assert shares_of(smooth).max() < 1e-20
+def particles_of(f, seed=0):
+    """Return how many particles are rough of one scale, smooth, and of two scales."""
+    posterior = GaussianProcess(kernel="matern52_two_scales", mean_variance=1.0).fit(*trials(f, seed=seed)).posterior
+    a, w = posterior.hyperparameters.inverse_l[:, 2:].T
+    alone = w < 1e-20
+    return np.sum(alone & (a >= 1e-20)), np.sum(alone & (a < 1e-20)), np.sum(~alone)
 
 
-def test_a_rough_function_has_two():
-    assert shares_of(rough).min() > 0.05
+def test_a_smooth_function_has_one_smooth_scale():
+    assert particles_of(smooth) == (0, 10, 0)
+
+
+def test_a_rough_function_has_two_scales():
+    assert particles_of(rough) == (0, 0, 10)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_draws_of_a_process_are_modelled_as_that_process(seed):
+    assert particles_of(drawn("squared_exponential", seed), seed)[1] == 10
+    assert particles_of(drawn("matern52", seed), seed)[0] >= 8
 
 
 def test_rough_between_trials_it_predicts_the_trend_and_knows_what_it_does_not_know():
@@ -54,19 +77,30 @@ def test_rough_between_trials_it_predicts_the_trend_and_knows_what_it_does_not_k
     assert 0.9 < np.mean(np.abs(mean - truth) < 1.96 * std) < 0.999
 
 
-def test_particles_predict_as_scikit_learn():
-    X, y = trials(rough, 30)
-    Q, _ = trials(rough, 7, 1)
+@pytest.mark.parametrize(("f", "tolerance"), [(rough, 1e-5), (smooth, 2e-4), (drawn("matern52", 0), 1e-5)])
+def test_particles_predict_as_scikit_learn(f, tolerance):
+    X, y = trials(f, 30)
+    Q, _ = trials(f, 7, 1)
     posterior = GaussianProcess(kernel="matern52_two_scales", ratio=1e-8).fit(X, y).posterior
     found, p = posterior.moments(Q), posterior.hyperparameters
     for j, scales in enumerate(posterior.length_scales):
         a, w = p.inverse_l[j, 2:]
-        kernel = ConstantKernel(p.s2[j] * (1.0 - w)) * Matern(scales, nu=2.5)
-        kernel += ConstantKernel(p.s2[j] * w) * Matern(scales / a, nu=2.5)
+        kernel = ConstantKernel(p.s2[j] * (1.0 - w)) * (RBF(scales) if a < 1e-20 else Matern(scales, nu=2.5))
+        if w >= 1e-20:
+            kernel += ConstantKernel(p.s2[j] * w) * Matern(scales / a, nu=2.5)
         reference = GaussianProcessRegressor(kernel, alpha=1e-8 * p.s2[j], optimizer=None, normalize_y=True).fit(X, y)
         mean, std = reference.predict(Q, return_std=True)
-        np.testing.assert_allclose(found.mean[j], mean, atol=1e-5)
+        np.testing.assert_allclose(found.mean[j], mean, atol=tolerance)
         np.testing.assert_allclose(np.sqrt(found.variance[j]), std, atol=1e-4)
+
+
+def test_particles_are_shared_out_by_evidence():
+    """By largest remainders: of ten, .55, .25 and .2 are 5.5, 2.5 and 2, and the first of two equal remainders wins."""
+    assert shared_out(np.log([0.5, 0.3, 0.2]) - 700.0, 10) == [5, 3, 2]
+    assert shared_out(np.log([0.55, 0.25, 0.2]) + 700.0, 10) == [6, 2, 2]
+    assert shared_out(np.array([0.0, np.nan, 0.0]), 4) == [2, 0, 2]
+    assert shared_out(np.full(3, np.nan), 10) == [10, 0, 0]
+    assert shared_out(np.array([-np.inf, -3.0, -2.0]), 1) == [0, 0, 1]
 
 
 def test_evidence_is_the_integral_over_the_hyperparameter():

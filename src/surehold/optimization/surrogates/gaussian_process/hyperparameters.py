@@ -5,7 +5,7 @@ Legend: theta (p,) = log length-scales (d), then log signal variance and log noi
 """
 
 from dataclasses import dataclass, fields
-from math import exp, log, pi
+from math import log, pi
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -35,10 +35,9 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import (
     log_posterior_and_gradient,
 )
 
-__all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "log_evidence_and_root", "mode"]
+__all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "log_evidence_and_root", "mode", "shared_out"]
 
-_SURE = 50.0  # differences of log evidences beyond which a model is out of the question
-_ABSENT = -50.0  # log(w / (1 - w)) of a short part that adds nothing in double precision
+_ABSENT = -50.0  # log(w / (1 - w)) of a short part that adds nothing in double precision, log a that is none
 _METHODS = ("elliptical_slice", "slice", "map")
 
 
@@ -126,7 +125,7 @@ def learn(
         samples = slice_sample(log_posterior, evidence, start, rng, widths=learning.width, **counts)
         return Learnt(samples.states, samples.evaluations)
     if evidence.kernel == TWO_SCALES:
-        return _learn_one_or_two_scales(evidence, learning, rng)
+        return _learn_by_evidence(evidence, learning, rng)
     center, evaluations = mode(evidence)
     if learning.method == "map":
         return Learnt(center[None, :], evaluations)
@@ -134,36 +133,53 @@ def learn(
     return _around(evidence, learning, learning.particles, center, root, rng, evaluations + center.size + 1)
 
 
-def _learn_one_or_two_scales(evidence: Evidence, learning: Learning, rng: np.random.Generator) -> Learnt:
-    """Draw particles of two models, equally likely beforehand: both scales, and the long one alone.
+def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Generator) -> Learnt:
+    """Draw particles of three models, equally likely beforehand: one rough scale, one smooth scale, and two scales.
 
     Each has as many particles as its evidence p(y | model) says (Laplace's method, MacKay 2003, section 27), so that
-    a smooth function is modelled as if there were no second scale.
+    a function of one scale is modelled as if there were no second one, and one that all derivatives exist of (squared
+    exponential) as such.
     """
     d = evidence.X.shape[1]
-    long = evidence._replace(
-        kernel=kernel_number("matern52"),
-        prior_mean=np.delete(evidence.prior_mean, [d, d + 1]),
-        prior_deviation=np.delete(evidence.prior_deviation, [d, d + 1]),
+    shape = [d, d + 1]
+    alone = evidence._replace(
+        prior_mean=np.delete(evidence.prior_mean, shape), prior_deviation=np.delete(evidence.prior_deviation, shape)
     )
-    (one, cost_one), (two, cost_two) = mode(long), mode(evidence)
-    log_one, root_one = log_evidence_and_root(long, one)
-    log_two, root_two = log_evidence_and_root(evidence, two)
-    cost = cost_one + cost_two + one.size + two.size + 2
-    margin = log_one - log_two
-    if np.isnan(margin):  # neither has an evidence: the simpler one
-        margin = _SURE
-    two_scales = 1.0 / (1.0 + exp(min(max(margin, -_SURE), _SURE)))
-    m = 1 if learning.method == "map" else learning.particles
-    keep = round(two_scales * m)
-    if learning.method == "map":
-        first, second = Learnt(one[None, :][: m - keep], cost), Learnt(two[None, :][:keep], 0)
-    else:
-        first = _around(long, learning, m - keep, one, root_one, rng, cost)
-        second = _around(evidence, learning, keep, two, root_two, rng)
-    shape = np.tile([float(evidence.prior_mean[d]), _ABSENT], (m - keep, 1))
-    alone = np.column_stack([first.particles[:, :d], shape, first.particles[:, d:]])
-    return Learnt(np.concatenate([alone, second.particles]), first.evaluations + second.evaluations)
+    one_scale = {  # log a that tells the long process, where it is alone
+        "matern52": float(evidence.prior_mean[d]),
+        "squared_exponential": _ABSENT,
+    }
+    models = [*(alone._replace(kernel=kernel_number(name)) for name in one_scale), evidence]
+    found = [mode(model) for model in models]
+    known = [log_evidence_and_root(model, center) for model, (center, _) in zip(models, found, strict=True)]
+    keep = shared_out(np.array([log for log, _ in known]), 1 if learning.method == "map" else learning.particles)
+    parts, cost = [], sum(evaluations + center.size + 1 for center, evaluations in found)
+    for model, (center, _), (_, root), count in zip(models, found, known, keep, strict=True):
+        if learning.method == "map":
+            parts.append(center[None, :][:count])
+            continue
+        part = _around(model, learning, count, center, root, rng)
+        parts.append(part.particles)
+        cost += part.evaluations
+    for i, log_a in enumerate(one_scale.values()):
+        shapes = np.tile([log_a, _ABSENT], (len(parts[i]), 1))
+        parts[i] = np.column_stack([parts[i][:, :d], shapes, parts[i][:, d:]])
+    return Learnt(np.concatenate(parts), cost)
+
+
+def shared_out(log_evidences: NDArray[np.float64], count: int) -> list[int]:
+    """Return how many of `count` particles each model has, in proportion to its evidence; NaN is none.
+
+    What is left by rounding down goes to the largest remainders. Without any evidence all go to the first model.
+    """
+    logs = np.where(np.isnan(log_evidences), -np.inf, log_evidences)
+    if logs.max() == -np.inf:
+        logs = np.where(np.arange(len(logs)) == 0, 0.0, -np.inf)
+    shares = np.exp(logs - logs.max())
+    shares *= count / shares.sum()
+    keep = np.floor(shares).astype(int)
+    keep[np.argsort(keep - shares, kind="stable")[: count - keep.sum()]] += 1
+    return keep.tolist()
 
 
 def _around(

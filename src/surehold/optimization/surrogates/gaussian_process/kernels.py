@@ -24,6 +24,8 @@ The form of two scales is the sum of a long and a short process, independent of 
 one proportion a in all dimensions; w is the share of the short one:
     Matern-5/2, two scales  c = (1 - w) c_long(rho) + w c_long(a rho),  g = (1 - w) g_long(rho) + w a^2 g_long(a rho)
 Its scales (d + 2,) are the inverse length-scales followed by a and w; those of the others are the former (d,) alone.
+Where w is 0 the long process is alone, and a, which then says nothing else, says which one it is: squared exponential
+where a is 0, Matern-5/2 otherwise. So particles of all three can stand side by side.
 """
 
 from math import sqrt
@@ -54,7 +56,7 @@ __all__ = [
 KERNELS: Final = ("matern52", "matern32", "squared_exponential", "matern52_product", "matern52_two_scales")
 _PRODUCT: Final = 3
 TWO_SCALES: Final = 4
-_NO_SHARE: Final = 1e-20  # a share that adds nothing in double precision
+_NOTHING: Final = 1e-20  # a share that adds nothing in double precision; a proportion that is none
 _SQRT3: Final = sqrt(3.0)
 _SQRT5: Final = sqrt(5.0)
 _FAR: Final = 700.0  # beyond this exponent a correlation is 0 in double precision
@@ -75,7 +77,7 @@ def shape_size(kernel: int) -> int:
 @njit(cache=True, fastmath={"contract"})
 def _transform(kernel, squared, scales):
     """Overwrite squared scaled distances (n,) with correlations c."""
-    if kernel == TWO_SCALES and scales[-1] >= _NO_SHARE:
+    if kernel == TWO_SCALES and scales[-1] >= _NOTHING:
         a, w = scales[-2], scales[-1]
         for i in range(squared.size):
             rho = _SQRT5 * sqrt(squared[i])
@@ -83,7 +85,7 @@ def _transform(kernel, squared, scales):
             s = min(a * rho, _FAR)
             squared[i] = (1.0 - w) * ((1.0 + r + r * r / 3.0) * exponential(-r))
             squared[i] += w * ((1.0 + s + s * s / 3.0) * exponential(-s))
-    elif kernel == 0 or kernel == TWO_SCALES:
+    elif kernel == 0 or (kernel == TWO_SCALES and scales[-2] >= _NOTHING):
         for i in range(squared.size):
             r = min(_SQRT5 * sqrt(squared[i]), _FAR)
             squared[i] = (1.0 + r + r * r / 3.0) * exponential(-r)
@@ -99,7 +101,7 @@ def _transform(kernel, squared, scales):
 @njit(cache=True, fastmath={"contract"})
 def _transform_with_factor(kernel, squared, factor, scales):
     """Overwrite squared scaled distances (n,) with correlations c and fill `factor` (n,) with radial factors g."""
-    if kernel == TWO_SCALES and scales[-1] >= _NO_SHARE:
+    if kernel == TWO_SCALES and scales[-1] >= _NOTHING:
         a, w = scales[-2], scales[-1]
         for i in range(squared.size):
             rho = _SQRT5 * sqrt(squared[i])
@@ -108,7 +110,7 @@ def _transform_with_factor(kernel, squared, factor, scales):
             e, f = (1.0 - w) * exponential(-r), w * exponential(-s)
             squared[i] = (1.0 + r + r * r / 3.0) * e + (1.0 + s + s * s / 3.0) * f
             factor[i] = 5.0 / 3.0 * ((1.0 + r) * e + a * a * (1.0 + s) * f)
-    elif kernel == 0 or kernel == TWO_SCALES:
+    elif kernel == 0 or (kernel == TWO_SCALES and scales[-2] >= _NOTHING):
         for i in range(squared.size):
             r = min(_SQRT5 * sqrt(squared[i]), _FAR)
             e = exponential(-r)
