@@ -35,7 +35,7 @@ WEIGHTS = np.array([0.4, 0.15, 0.15, 0.15, 0.15])
 @pytest.mark.parametrize("kernel", ["matern52", "matern52_two_scales"])
 @pytest.mark.parametrize("gradient", [False, True])
 def test_with_fewer_trials_than_neighbors_nothing_is_left_out(gradient, kernel):
-    exact, near = _both(NEIGHBORS[0], kernel=kernel)
+    exact, near = _both(NEIGHBORS[0] - 1, kernel=kernel)  # one more is under way below
     np.testing.assert_array_equal(near.length_scales, exact.length_scales)
     queries = np.random.default_rng(2).random((7, 2))
     for ours, theirs in zip(
