@@ -1,16 +1,19 @@
-"""What the smooth one of the default's three models gains: `python -m benchmarks.smooth_model --first 330 --count 117`.
+"""What the smooth one of the default's three models gains: `python -m benchmarks.smooth_model landscapes`.
 
-Landscapes of `benchmarks.generated_landscapes`' training seeds, in one to eight variables under all kinds of noise; a
-run of the default on each, and one whose model has no particles of the squared-exponential process, with the same
-initial design. Printed are, of all landscapes and by their variables, mean regrets [%] at full budget with standard
-errors, runs within 1 %, the paired difference, that of the logarithm (base 10; regrets below 0.01 % count as that), and
-how many runs come within 1 % with the smooth model that do not without it, and the other way round.
+    landscapes  training seeds of `benchmarks.generated_landscapes`, one to eight variables, all kinds of noise; final
+                regret [%] of all, by number of variables and by shape. `--rows FILE` keeps the runs, and those that it
+                holds are not made again; with `--count 0` all of them are printed
+    robust      functions of `benchmarks.robust_regret` (`--names`), seeds 200 to 229; final regret [%]
+    smooth      functions of `benchmarks.smooth_regret` (`--names`) without noise, seeds 10 to 29; logarithms of the
+                regret at half and full budget
+    hidden      no runs: which landscapes are hidden, because as many uniform points as there are trials have less than
+                half a chance that one of them sees a tenth of the height of the hill where the outcome is best, that
+                hill alone, without noise; `--set test` takes the test seeds
 
-`--rows FILE` keeps the runs; those that it holds are not made again, and with `--count 0` all of them are printed.
-
-`--hidden` prints how many landscapes are hidden instead: as many uniform points as there are trials have less than half
-a chance that one of them sees a tenth of the height of the hill where the outcome is best, that hill alone, without
-noise. `--set test` takes the test seeds for that.
+Of each problem a run of the default, and one whose model has no particles of the squared-exponential process, with the
+same initial design. Printed are means with standard errors, the paired difference and, of regrets in per cent, runs
+within 1 %, the difference of the logarithm (base 10; regrets below 0.01 % count as that), and how many runs come within
+1 % with the smooth model that do not without it, and the other way round.
 """
 
 import argparse
@@ -21,7 +24,9 @@ from unittest import mock
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from benchmarks.generated_landscapes import BUDGETS, TEST, TRAINING, landscape
+import surehold as sh
+from benchmarks import robust_regret, smooth_regret
+from benchmarks.generated_landscapes import BUDGETS, SHAPES, TEST, TRAINING, landscape
 from benchmarks.search_variants import begun, regret
 from surehold.optimization.surrogates.gaussian_process import hyperparameters
 
@@ -29,21 +34,39 @@ VARIANTS = ("without", "default")
 GROUPS = {"all": (1, 8), "1-3 variables": (1, 3), "4-6 variables": (4, 6), "7-8 variables": (7, 8)}
 SEEN, POINTS, LEAST = 0.1, 20_000, 0.01
 SMOOTH = np.array([False, True, False])  # of rough, smooth, two scales
+#: subject -> (first seed, number of seeds)
+SEEDS = {"landscapes": (330, 117), "robust": (200, 30), "smooth": (10, 20), "hidden": (0, 40)}
+NAMES = {
+    "robust": ["needle-3", "many", "gm 0.02", "gm 0.01", "ridge"],
+    "smooth": [name for name in smooth_regret.FUNCTIONS if not name.endswith("-wide")],
+}
 
 
-def run(seed, variant):
-    """Return the final regret [%] of a run on the landscape of a seed."""
+def searching(variant):
+    """Return a context in which the default's model has or has no particles of the smooth process."""
     own = hyperparameters.shared_out
 
     def without(log_evidences, count):
         return own(np.where(SMOOTH, np.nan, log_evidences), count)
 
+    return mock.patch.object(hyperparameters, "shared_out", without if variant == "without" else own)
+
+
+def on_landscape(seed):
+    """Return the final regret [%] on the landscape of a seed."""
     problem, design, (optimizer,) = begun(seed, "two_scales")
-    with mock.patch.object(hyperparameters, "shared_out", without if variant == "without" else own):
-        for _ in range(BUDGETS[problem.dimension]):
-            x = np.clip(design.pop(0) if design else optimizer.ask(), 0.0, 1.0)
-            optimizer.tell(x, problem(x))
-        return regret(problem, optimizer.recommend().x)
+    for _ in range(BUDGETS[problem.dimension]):
+        x = np.clip(design.pop(0) if design else optimizer.ask(), 0.0, 1.0)
+        optimizer.tell(x, problem(x))
+    return regret(problem, optimizer.recommend().x)
+
+
+def on_robust(name, seed):
+    """Return the final robust regret [%] of a function of `benchmarks.robust_regret`."""
+    problem = robust_regret.problem_named(name)
+    best = sh.problems.robust_optimum(problem.function, problem.noise).value
+    answers, _ = robust_regret.run(problem, "default", robust_regret.BUDGETS[problem.function.box.dimension], seed)
+    return 100.0 * float(best - problem.function.expectation(np.asarray(answers)[-1:], problem.noise)[0]) / best
 
 
 def chance_seen(seed):
@@ -61,52 +84,87 @@ def chance_seen(seed):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--first", type=int, default=330, help="number of the first landscape of the set")
-    parser.add_argument("--count", type=int, default=117, help="landscapes")
-    parser.add_argument("--rows", type=Path, help="file of the runs, a line each")
-    parser.add_argument("--hidden", action="store_true", help="print how many landscapes are hidden; no runs")
-    parser.add_argument("--set", choices=["training", "test"], default="training", help="of --hidden")
+    parser.add_argument("subject", choices=list(SEEDS))
+    parser.add_argument("--first", type=int, help="first seed, or its number in the set")
+    parser.add_argument("--count", type=int, help="seeds")
+    parser.add_argument("--names", nargs="+", help="functions, of robust and smooth")
+    parser.add_argument("--rows", type=Path, help="file of the runs on landscapes, a line each")
+    parser.add_argument("--set", choices=["training", "test"], default="training", help="of hidden landscapes")
     arguments = parser.parse_args()
-    seeds = (TEST if arguments.set == "test" else TRAINING)[arguments.first : arguments.first + arguments.count]
-    if arguments.hidden:
-        hidden = {seed: chance_seen(seed) < 0.5 for seed in seeds}
-        for name, members in _groups(seeds).items():
-            print(f"{name}: {sum(hidden[seed] for seed in members)} of {len(members)} hidden")
-        return
-    known = {}
-    if arguments.rows is not None and arguments.rows.exists():
-        known = {(seed, variant): found for seed, variant, found in map(json.loads, arguments.rows.open())}
+    subject = arguments.subject
+    first, count = (
+        usual if given is None else given
+        for usual, given in zip(SEEDS[subject], (arguments.first, arguments.count), strict=True)
+    )
     with threadpool_limits(1):
-        for seed in seeds:
-            for variant in VARIANTS:
-                if (seed, variant) not in known:
-                    known[seed, variant] = run(seed, variant)
-                    if arguments.rows is not None:
-                        with arguments.rows.open("a") as file:
-                            print(json.dumps([seed, variant, known[seed, variant]]), file=file)
-    seeds = seeds or sorted({seed for seed, _ in known})
+        if subject == "hidden":
+            _print_hidden((TEST if arguments.set == "test" else TRAINING)[first : first + count])
+        elif subject == "landscapes":
+            _print_landscapes(TRAINING[first : first + count], arguments.rows)
+        else:
+            for name in arguments.names or NAMES[subject]:
+                _print_function(subject, name, range(first, first + count))
+
+
+def _print_hidden(seeds):
+    hidden = {seed: chance_seen(seed) < 0.5 for seed in seeds}
     for name, members in _groups(seeds).items():
+        found = [str(seed) for seed in members if hidden[seed]]
+        print(f"{name}: {len(found)} of {len(members)} hidden: {' '.join(found)}")
+
+
+def _print_landscapes(seeds, file):
+    known = {}
+    if file is not None and file.exists():
+        known = {(seed, variant): found for seed, variant, found in map(json.loads, file.open())}
+    for seed in seeds:
+        for variant in VARIANTS:
+            if (seed, variant) not in known:
+                with searching(variant):
+                    known[seed, variant] = on_landscape(seed)
+                if file is not None:
+                    with file.open("a") as kept:
+                        print(json.dumps([seed, variant, known[seed, variant]]), file=kept)
+    for name, members in _groups(seeds or sorted({seed for seed, _ in known})).items():
         if len(members) > 1:
-            _print_group(name, *(np.array([known[seed, variant] for seed in members]) for variant in VARIANTS))
+            _print_regrets(name, *(np.array([known[seed, variant] for seed in members]) for variant in VARIANTS))
+
+
+def _print_function(subject, name, seeds):
+    found = []
+    for variant in VARIANTS:
+        with searching(variant):
+            if subject == "robust":
+                found.append(np.array([on_robust(name, seed) for seed in seeds]))
+            else:
+                found.append(np.array([smooth_regret.run(name, "default", seed)[:2] for seed in seeds]))
+    if subject == "robust":
+        _print_regrets(name, *found)
+        return
+    for budget, before, now in zip(("half", "full"), found[0].T, found[1].T, strict=True):
+        print(f"{name:18} {budget}  without {_told(before)}; with {_told(now)}; difference {_told(now - before)}")
 
 
 def _groups(seeds):
     """Return the seeds of each group."""
-    d = {seed: landscape(seed).dimension for seed in seeds}
-    return {name: [seed for seed in seeds if low <= d[seed] <= high] for name, (low, high) in GROUPS.items()}
+    drawn = {seed: landscape(seed) for seed in seeds}
+    groups = {name: [s for s in seeds if low <= drawn[s].dimension <= high] for name, (low, high) in GROUPS.items()}
+    return groups | {shape: [s for s in seeds if drawn[s].shape == shape] for shape in SHAPES}
 
 
-def _print_group(name, before, now):
-    def told(values):
-        return f"{values.mean():+.3f} ({values.std(ddof=1) / len(values) ** 0.5:.3f})"
-
+def _print_regrets(name, before, now):
     logarithm = np.log10(np.maximum(now, LEAST) / np.maximum(before, LEAST))
     found, once = now <= 1.0, before <= 1.0
     print(
-        f"{name:14} {len(now):4}  without {told(before)}, {once.sum()} within 1 %; with {told(now)}, {found.sum()};"
-        f" difference {told(now - before)}, of logarithms {told(logarithm)};"
-        f" won {np.sum(found & ~once)}, lost {np.sum(once & ~found)}"
+        f"{name:14} {len(now):4}  without {_told(before)}, {once.sum()} within 1 %; with {_told(now)}, {found.sum()};"
+        f" difference {_told(now - before)}, of logarithms {_told(logarithm)};"
+        f" won {np.sum(found & ~once)}, lost {np.sum(once & ~found)}",
+        flush=True,
     )
+
+
+def _told(values):
+    return f"{values.mean():+.3f} ({values.std(ddof=1) / len(values) ** 0.5:.3f})"
 
 
 if __name__ == "__main__":
