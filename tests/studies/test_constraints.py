@@ -226,10 +226,11 @@ def test_a_study_learns_of_failures_as_its_optimizer_does(tmp_path, rule):
 
 
 def test_a_study_in_safe_mode_starts_where_it_is_told_and_keeps_its_limits(tmp_path):
+    """Of many trials one of a hundred may break them; of 24 seeds none has one among its nine."""
     settings = {
         "seed": 0,
         "constraints": {"torque": [None, 3.0]},
-        "safety": 0.95,
+        "safety": 0.99,
         "initial_points": [{"x": 0.1}, {"x": 0.2}, {"x": 0.3}],
     }
     space = SearchSpace({"x": (0.0, 1.0)})
