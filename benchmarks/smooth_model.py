@@ -6,9 +6,8 @@
     robust      functions of `benchmarks.robust_regret` (`--names`), seeds 200 to 229; final regret [%]
     smooth      functions of `benchmarks.smooth_regret` (`--names`) without noise, seeds 10 to 29; logarithms of the
                 regret at half and full budget
-    hidden      no runs: which landscapes are hidden, because as many uniform points as there are trials have less than
-                half a chance that one of them sees a tenth of the height of the hill where the outcome is best, that
-                hill alone, without noise; `--set test` takes the test seeds
+    time        no search: CPU milliseconds of an ask with its learning, after 50 and 140 trials in two variables and
+                150 in seven, with input noise and without; medians of 9, the two in turns
 
 Of each problem a run of the default, and one whose model has no particles of the squared-exponential process, with the
 same initial design. Printed are means with standard errors, the paired difference and, of regrets in per cent, runs
@@ -18,6 +17,8 @@ within 1 %, the difference of the logarithm (base 10; regrets below 0.01 % count
 
 import argparse
 import json
+import time
+from contextlib import contextmanager
 from pathlib import Path
 from unittest import mock
 
@@ -26,30 +27,39 @@ from threadpoolctl import threadpool_limits
 
 import surehold as sh
 from benchmarks import robust_regret, smooth_regret
-from benchmarks.generated_landscapes import BUDGETS, SHAPES, TEST, TRAINING, landscape
+from benchmarks.generated_landscapes import BUDGETS, SHAPES, TRAINING, landscape
 from benchmarks.search_variants import begun, regret
 from surehold.optimization.surrogates.gaussian_process import hyperparameters
+from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
 
 VARIANTS = ("without", "default")
 GROUPS = {"all": (1, 8), "1-3 variables": (1, 3), "4-6 variables": (4, 6), "7-8 variables": (7, 8)}
-SEEN, POINTS, LEAST = 0.1, 20_000, 0.01
-SMOOTH = np.array([False, True, False])  # of rough, smooth, two scales
+LEAST = 0.01
+SMOOTH = kernel_number("squared_exponential")
 #: subject -> (first seed, number of seeds)
-SEEDS = {"landscapes": (330, 117), "robust": (200, 30), "smooth": (10, 20), "hidden": (0, 40)}
+SEEDS = {"landscapes": (330, 117), "robust": (200, 30), "smooth": (10, 20), "time": (0, 9)}
 NAMES = {
     "robust": ["needle-3", "many", "gm 0.02", "gm 0.01", "ridge"],
     "smooth": [name for name in smooth_regret.FUNCTIONS if not name.endswith("-wide")],
 }
 
 
+@contextmanager
 def searching(variant):
-    """Return a context in which the default's model has or has no particles of the smooth process."""
-    own = hyperparameters.shared_out
+    """Run the body with the default's model as it is or, for "without", without learning the smooth process at all."""
+    learns, weighs = hyperparameters.mode, hyperparameters.log_evidence_and_root
 
-    def without(log_evidences, count):
-        return own(np.where(SMOOTH, np.nan, log_evidences), count)
+    def mode(evidence):
+        return (evidence.prior_mean, 0) if evidence.kernel == SMOOTH else learns(evidence)
 
-    return mock.patch.object(hyperparameters, "shared_out", without if variant == "without" else own)
+    def log_evidence_and_root(evidence, center):
+        return (np.nan, np.eye(center.size)) if evidence.kernel == SMOOTH else weighs(evidence, center)
+
+    if variant == "default":
+        yield
+    else:
+        with mock.patch.multiple(hyperparameters, mode=mode, log_evidence_and_root=log_evidence_and_root):
+            yield
 
 
 def on_landscape(seed):
@@ -69,17 +79,15 @@ def on_robust(name, seed):
     return 100.0 * float(best - problem.function.expectation(np.asarray(answers)[-1:], problem.noise)[0]) / best
 
 
-def chance_seen(seed):
-    """Return the chance that one of as many uniform points as trials sees a tenth of the hill of the best outcome."""
-    problem = landscape(seed)
-    points = np.random.default_rng([seed, 7]).random((POINTS, problem.dimension))
-    inverses = np.linalg.inv(problem.covariances)
-    at_best, at_points = (
-        np.exp(-0.5 * np.einsum("nki,kij,nkj->nk", apart, inverses, apart))
-        for apart in (x[:, None] - problem.centers for x in (problem.best().x[None], points))
-    )
-    highest = int(np.argmax(problem.heights * at_best[0]))
-    return 1.0 - np.mean(at_points[:, highest] < SEEN) ** BUDGETS[problem.dimension]
+def ask_seconds(n, d, noise, seed):
+    """Return CPU seconds of an ask after n trials in d variables."""
+    rng = np.random.default_rng([seed, n, d])
+    optimizer = sh.Optimizer(sh.Box.unit(d), n_initial=1, seed=seed, input_noise=noise)
+    for x in rng.random((n, d)):
+        optimizer.tell(x, float(np.sin(6.0 * x[0]) + x.sum() ** 2))
+    started = time.process_time()
+    optimizer.ask()
+    return time.process_time() - started
 
 
 def main():
@@ -89,7 +97,6 @@ def main():
     parser.add_argument("--count", type=int, help="seeds")
     parser.add_argument("--names", nargs="+", help="functions, of robust and smooth")
     parser.add_argument("--rows", type=Path, help="file of the runs on landscapes, a line each")
-    parser.add_argument("--set", choices=["training", "test"], default="training", help="of hidden landscapes")
     arguments = parser.parse_args()
     subject = arguments.subject
     first, count = (
@@ -97,8 +104,8 @@ def main():
         for usual, given in zip(SEEDS[subject], (arguments.first, arguments.count), strict=True)
     )
     with threadpool_limits(1):
-        if subject == "hidden":
-            _print_hidden((TEST if arguments.set == "test" else TRAINING)[first : first + count])
+        if subject == "time":
+            _print_times(range(first, first + count))
         elif subject == "landscapes":
             _print_landscapes(TRAINING[first : first + count], arguments.rows)
         else:
@@ -106,11 +113,16 @@ def main():
                 _print_function(subject, name, range(first, first + count))
 
 
-def _print_hidden(seeds):
-    hidden = {seed: chance_seen(seed) < 0.5 for seed in seeds}
-    for name, members in _groups(seeds).items():
-        found = [str(seed) for seed in members if hidden[seed]]
-        print(f"{name}: {len(found)} of {len(members)} hidden: {' '.join(found)}")
+def _print_times(seeds):
+    for n, d in ((50, 2), (140, 2), (150, 7)):
+        for noise, title in ((None, "without noise"), (sh.InputNoise.unit(0.03), "under noise")):
+            taken = {variant: [] for variant in VARIANTS}
+            for seed in (0, *seeds):  # the first one compiles
+                for variant in VARIANTS:
+                    with searching(variant):
+                        taken[variant].append(ask_seconds(n, d, noise, seed))
+            before, now = (1000.0 * np.median(taken[variant][1:]) for variant in VARIANTS)
+            print(f"({n}, {d}) {title:13}  without {before:.1f} ms, with {now:.1f} ms, {now / before:.2f} times")
 
 
 def _print_landscapes(seeds, file):
