@@ -35,8 +35,6 @@ ANCHORS: Final = 3
 #: coarse ranking need only place the best input among the first 16. Never measured on its own; what a quadrature's
 #: ranking loses: python -m benchmarks.quadrature_error.
 SHORTLIST: Final = 16
-#: Tried inputs, the best of these, between which a risk measure by more perturbations decides. Never measured.
-FINALISTS: Final = 8
 #: Of more tried inputs than this only those with the highest values are ranked by their outcome: an ask takes the same
 #: time whether there are a thousand or ten thousand. Never measured against other numbers; python -m benchmarks.growth.
 CONTENDERS: Final = 400
@@ -105,10 +103,12 @@ FEW_VARIABLES: Final = 3
 SCRAMBLINGS: Final = 64
 #: Representative conditions, of uncontrolled variables, by which candidates are screened. Never measured.
 COARSE_CONDITIONS: Final = 8
-#: Quasi-random points, as a power of two, for the answer under a risk measure, for the last climb of an answer anywhere
-#: in the box, and for the description of either: quantiles need more points than means. What is lost by the rule alone:
-#: python -m benchmarks.rule_regret.
+#: Quasi-random points, as a power of two, for the last climb of an answer anywhere in the box, and for the description
+#: of answers: quantiles need more points than means. What is lost by the rule alone: python -m benchmarks.rule_regret.
 OUTCOME_EXPONENT: Final = 7
+#: The same for the correction of a risk measure, and in a box of few variables. What is lost by the rule alone, too.
+CORRECTION_EXPONENT: Final = 7
+CORRECTION_EXPONENT_OF_FEW: Final = 9
 
 # --- the maximizer of the acquisition function ------------------------------------------------------------------------
 
@@ -129,6 +129,8 @@ CANDIDATES_IN_REGIONS: Final = 512
 STARTS_IN_REGIONS: Final = 6
 #: Evaluations, with gradient, of one ascent. Never measured on its own.
 ASCENT_EVALUATIONS: Final = 40
+#: Evaluations of the last ascent, by the corrected risk measure, which begins at the top by the uncorrected one.
+LAST_EVALUATIONS: Final = 10
 #: Length of an ascent's first step and of its longest one later, in box widths. Never measured.
 ASCENT_FIRST_STEP: Final = 0.05
 ASCENT_LONGEST_STEP: Final = 0.25

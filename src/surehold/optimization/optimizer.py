@@ -319,7 +319,7 @@ class Optimizer(Record):
                 allowed=ranking.accurate.allowed,
             )
             if where == "observed":
-                index = ranking.answer(posterior, history)
+                index = int(ranking.order(posterior, history.tried, history.observed)[0])
                 u, observed = history.tried[index], float(history.observed[index])
             else:
                 rng = self._rng(3, len(self._trials))

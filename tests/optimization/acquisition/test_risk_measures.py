@@ -253,6 +253,47 @@ def test_improvement_over_what_is_known(known):
     np.testing.assert_allclose(gradient, np.tile(SLOPE, (2, 1)), atol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["mean-variance", "mean-std", "var", "cvar"])
+def test_the_correction_of_few_perturbations_against_closed_forms(name):
+    """The square of N(u, s^2): its variance is 2 s^4 + 4 u^2 s^2, its quantiles are a noncentral chi-squared's."""
+    X = np.linspace(-0.6, 1.6, 40)[:, None]
+    process = GaussianProcess(kernel="squared_exponential", length_scales=[1.0], signal_variance=100.0)
+    sure = process.fit(X, X[:, 0] ** 2).posterior
+    U, s = np.array([[0.0], [0.1], [0.4]]), 0.1
+    square = stats.ncx2(1, (U[:, 0] / s) ** 2, scale=s**2)
+    quantile = square.ppf(0.1)
+    spread = np.sqrt(2.0 * s**4 + 4.0 * U[:, 0] ** 2 * s**2)
+    exactly = {
+        "mean-variance": U[:, 0] ** 2 + s**2 - 2.0 * spread**2,
+        "mean-std": U[:, 0] ** 2 + s**2 - 2.0 * spread,
+        "var": quantile,
+        "cvar": np.array(
+            [
+                stats.ncx2(1, (u / s) ** 2, scale=s**2).expect(lb=0.0, ub=q)
+                for u, q in zip(U[:, 0], quantile, strict=True)
+            ]
+        )
+        / 0.1,
+    }[name]
+    few, many = (Perturbations(quasi_monte_carlo(np.array([[s**2]]), exponent)) for exponent in (4, 12))
+    alone = RiskImprovement(sure, few, Risk(name, 0.1, beta=2.0), None, np.random.default_rng(0))
+    off = np.abs(alone.expectation(U) - exactly)
+    left = np.abs(alone.corrected(many).expectation(U) - exactly)
+    assert np.all(left < 1e-2 * spread)
+    assert left.max() < 0.1 * off.max()
+
+
+@pytest.mark.parametrize("name", ["mean-std", "var"])
+def test_the_correction_of_an_unsure_model_against_joint_draws_at_all_points(unsure, name):
+    """It comes nearer to what 256 perturbations give with as many normal variables, on average over the box."""
+    few, many = (Perturbations(quasi_monte_carlo(S, exponent)) for exponent in (3, 8))
+    U, risk, rng = np.random.default_rng(3).random((25, 2)), Risk(name, beta=2.0), np.random.default_rng
+    drawn, alone = (many_values(unsure, points, risk, U, 40).mean(axis=0) for points in (many, few))
+    corrected = [RiskImprovement(unsure, few, risk, None, rng(k)).corrected(many).expectation(U) for k in range(40)]
+    left, off = (np.abs(values - drawn).mean() for values in (np.mean(corrected, axis=0), alone))
+    assert left < 0.95 * off
+
+
 def test_worst_case_bound(known, unsure):
     perturbations = Perturbations(sigma_points(S))
     U = np.array([[0.4, 0.5], [0.3, 0.6]])

@@ -47,10 +47,12 @@ def test_of_the_outcome_under_input_noise(risk, posterior):
     assert promise(ranking, posterior, HISTORY, np.random.default_rng(0)) == pytest.approx(expected, rel=1e-2)
 
 
-def test_of_a_risk_measure(posterior):
+@pytest.mark.parametrize("finer", [None, Perturbations(quasi_monte_carlo(S, 8))])
+def test_of_a_risk_measure(finer, posterior):
     accurate, risk = Perturbations(quasi_monte_carlo(S)), Risk("cvar")
-    ranking = Ranking(accurate, Perturbations(sigma_points(S)), risk, False)
+    ranking = Ranking(accurate, Perturbations(sigma_points(S)), risk, False, finer=finer)
     best, _ = ranking.incumbent(posterior, HISTORY, "robust")
-    expected = RiskImprovement(posterior, accurate, risk, best, np.random.default_rng(0))(GRID).max()
+    objective = RiskImprovement(posterior, accurate, risk, best, np.random.default_rng(0)).corrected(finer)
+    expected = objective(GRID).max()
     found = promise(ranking, posterior, HISTORY, np.random.default_rng(0))
     assert 0.999 * expected <= found < 1.1 * expected, "between two points of the grid there is little more"

@@ -64,10 +64,10 @@ def test_an_input_that_is_best_by_the_risk_only_is_found_among_many_that_are_bet
 def test_the_answer_by_a_risk_measure_is_that_of_the_finer_perturbations(risk, decided):
     """Perturbations to one side only put it to the other one, and of the mean they decide."""
     tried = np.linspace(0.0, 1.0, 26)[:, None]
-    posterior, history = GaussianProcess().fit(tried, f(tried)).posterior, History(tried, f(tried), NONE, NONE)
+    posterior = GaussianProcess().fit(tried, f(tried)).posterior
     one_sided = Perturbations(Quadrature(np.array([[0.0], [0.12]]), np.full(2, 0.5)))
     alone, answer = (
-        Ranking(one_sided, one_sided, Risk(risk), False, finer=finer).answer(posterior, history)
+        Ranking(one_sided, one_sided, Risk(risk), False, finer=finer).order(posterior, tried)[0]
         for finer in (None, FINER)
     )
     if not decided:

@@ -2,7 +2,14 @@
 
 import numpy as np
 
-from surehold.defaults import FEW_VARIABLES, OUTCOME_EXPONENT, QUASI_RANDOM_EXPONENT, QUASI_RANDOM_EXPONENT_OF_FEW
+from surehold.defaults import (
+    CORRECTION_EXPONENT,
+    CORRECTION_EXPONENT_OF_FEW,
+    FEW_VARIABLES,
+    OUTCOME_EXPONENT,
+    QUASI_RANDOM_EXPONENT,
+    QUASI_RANDOM_EXPONENT_OF_FEW,
+)
 from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.acquisition.scales import criterion_name
@@ -72,7 +79,8 @@ def strategy_named(
     coarse = Perturbations.of(input_noise, box, "unscented", border, allowed=allowed)
     finer = None
     if quadrature is None and rule == "quasi_monte_carlo" and risk.name != "worst" and shaken:
-        finer = Perturbations.of(input_noise, box, rule, border, exponent=OUTCOME_EXPONENT, allowed=allowed)
+        exponent = (CORRECTION_EXPONENT_OF_FEW if few else CORRECTION_EXPONENT) if averse else OUTCOME_EXPONENT
+        finer = Perturbations.of(input_noise, box, rule, border, exponent=exponent, allowed=allowed)
     ranking = Ranking(accurate, coarse, risk, noisy, thesis is None, finer)
     if thesis is not None:
         for setting, given in (

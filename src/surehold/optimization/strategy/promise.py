@@ -19,6 +19,7 @@ def promise(ranking: Ranking, posterior: Posterior, history: History, rng: np.ra
     Over the best input tried so far. Of a risk measure its improvement; of the worst case that of the mean, for the
     worst case has no distribution.
     """
+    finest = None
     if not len(history.tried):  # nothing feasible is known: whatever is, is an improvement
         return float("inf")
     scale: Scale = "exact" if ranking.exact_inputs else "robust"
@@ -31,7 +32,9 @@ def promise(ranking: Ranking, posterior: Posterior, history: History, rng: np.ra
     else:
         best, anchors = ranking.incumbent(posterior, history, scale)
         objective = screen = RiskImprovement(posterior, ranking.accurate, ranking.risk, float(best), rng)
-    found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, history.admission)
+        finest = objective.corrected(ranking.finer)
+    found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, history.admission, finest)
+    objective = objective if finest is None else finest
     if history.admission is not None:
         if not len(found):
             return 0.0

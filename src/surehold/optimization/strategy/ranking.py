@@ -4,7 +4,7 @@ Legend
     U         points of the unit cube, (q, d)
     accurate  quadrature by which outcomes under the input noise are computed
     coarse    sigma points: cheap, good enough to choose the inputs that are ranked again
-    finer     quadrature with more points than the accurate one: too dear for a search, not for its answer
+    finer     quadrature with more points than the accurate one: too dear for a search, not for its last step
     outcome   UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over perturbations i and particles j     thesis (3.21)
 """
 
@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import ANCHORS, CONTENDERS, FINALISTS, SCREENING_DIVISOR, SHORTLIST
+from surehold.defaults import ANCHORS, CONTENDERS, SCREENING_DIVISOR, SHORTLIST
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
 from surehold.optimization.acquisition.scales import Acquisition, CriterionName, Scale
 from surehold.optimization.constraints.admission import Admission
@@ -22,7 +22,7 @@ from surehold.optimization.maximizer.ascent import climb
 from surehold.optimization.maximizer.multistart import multistart
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
-from surehold.optimization.surrogates.protocol import Posterior, mixture
+from surehold.optimization.surrogates.protocol import Posterior, means, mixture
 
 __all__ = ["History", "Ranking"]
 
@@ -64,7 +64,7 @@ class Ranking:
     screened: bool = True
     """whether the coarse perturbations and a part of the particles choose which inputs are ranked accurately"""
     finer: Perturbations | None = None
-    """what decides between the best of them; None: the accurate ones, too"""
+    """what the best one anywhere climbs on by, and what corrects a risk measure; None: nothing"""
     _last: list[tuple[Posterior, NDArray[np.float64], NDArray[np.intp]]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
@@ -84,18 +84,11 @@ class Ranking:
             by_value = _latest_of_equals(observed)
             likely = by_value[:CONTENDERS]
             return np.concatenate([likely[self.order(posterior, U[likely])], by_value[CONTENDERS:]])
-        first = self._screening(posterior, U) if self.screened else self._measure(posterior, self.accurate, U)
+        first = self._screening(posterior, U) if self.screened else self._measure(posterior, U)
         order = np.argsort(-first, kind="stable")
         top = order[:SHORTLIST]
-        order[:SHORTLIST] = top[np.argsort(-self._measure(posterior, self.accurate, U[top]), kind="stable")]
+        order[:SHORTLIST] = top[np.argsort(-self._measure(posterior, U[top]), kind="stable")]
         return order
-
-    def answer(self, posterior: Posterior, history: History) -> int:
-        """Return the number of the tried input that is best; of those that `order` puts first, the finer decide."""
-        order = self.order(posterior, history.tried, history.observed)
-        if self.finer is None or self.risk.name == "mean":
-            return int(order[0])
-        return int(order[np.argmax(self._finest(posterior, history.tried[order[:FINALISTS]]))])
 
     def best(
         self,
@@ -110,18 +103,17 @@ class Ranking:
         little beside the best place.
         """
         anchors = tried[self.order(posterior, tried)[:ANCHORS]]
-        last = self.accurate if self.finer is None else self.finer
         if self.risk.name == "mean":
-            objective, screen, last = (_mean_outcome(posterior, rule) for rule in (self.accurate, self.coarse, last))
+            finer = self.accurate if self.finer is None else self.finer
+            objective, screen, last = (_mean_outcome(posterior, rule) for rule in (self.accurate, self.coarse, finer))
         else:
-            searched = self._searched(posterior)
-            objective = screen = self._measured(searched, self.accurate)
-            last = self._measured(searched, last)
+            objective = screen = self._improvement(posterior)
+            last = objective.corrected(self.finer)
         found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, admission)
         candidates = np.concatenate([anchors[:1], found[:ANCHORS]])
         if self.finer is not None and admission is None:
             candidates, _ = climb(last, candidates, np.zeros_like(candidates), np.ones_like(candidates))
-        return candidates[np.argmax(self._finest(posterior, candidates))]
+        return candidates[np.argmax(last(candidates))]
 
     def trials(self, posterior: Posterior, history: History, exactly: bool) -> NDArray[np.intp]:
         """Return the indices of the tried inputs, best first; `exactly`: as if there were no input noise."""
@@ -136,7 +128,7 @@ class Ranking:
             return float(values.max()), history.tried[np.argsort(-values, kind="stable")[:ANCHORS]]
         anchors = history.tried[self._order_of_tried(posterior, history)[:ANCHORS]]
         if self.risk.name != "mean":
-            return float(self._measure(posterior, self.accurate, anchors[:1])[0]), anchors
+            return float(self._measure(posterior, anchors[:1])[0]), anchors
         best = self.accurate.outcome(posterior, anchors[:1]).mean  # (m, 1)
         return best if scale == "robust" else float(best.mean()), anchors
 
@@ -146,7 +138,7 @@ class Ranking:
         Without it a second trial would be sent to the top on which the first one is on its way.
         """
         if self.risk.name != "mean":
-            return self._measure(posterior, self.accurate, pending).max()
+            return self._measure(posterior, pending).max()
         perturbations = Perturbations(exact(pending.shape[1])) if scale == "exact" else self.accurate
         mean = perturbations.outcome(posterior, pending).mean  # (m, p)
         return mean.mean(axis=0).max() if scale == "unscented" else mean.max(axis=1, keepdims=True)
@@ -157,42 +149,33 @@ class Ranking:
         """Return the name of the risk measure and what it is at two points (d,); None where the mean decides."""
         if self.risk.name == "mean" or self.exact_inputs:
             return None
-        return self.risk.name, *self._finest(posterior, np.array([one, other])).tolist()
+        return self.risk.name, *self._measure(posterior, np.array([one, other])).tolist()
 
     @property
     def exact_inputs(self) -> bool:
         """Whether inputs are reached exactly."""
         return len(self.accurate.quadrature.weights) == 1
 
-    def _measured(self, posterior: Posterior, perturbations: Perturbations) -> RiskImprovement:
-        # The same draws at every call: the ranking must not depend on how often it was asked for.
-        return RiskImprovement(posterior, perturbations, self.risk, None, np.random.default_rng(0))
-
-    def _measure(
-        self, posterior: Posterior, perturbations: Perturbations, U: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return the expected measure (q,) at U (q, d), the mean or a risk measure."""
+    def _measure(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the expected measure (q,) at U (q, d), the mean or a risk measure, which the finer ones correct."""
         if self.risk.name == "mean":
-            return perturbations.outcome(posterior, U).mean.mean(axis=0)
-        return self._measured(posterior, perturbations).expectation(U)
+            return self.accurate.outcome(posterior, U).mean.mean(axis=0)
+        return self._improvement(posterior).corrected(self.finer).expectation(U)
 
-    def _finest(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the expected measure (q,) at the few inputs U (q, d) between which the answer is chosen."""
-        if self.finer is None:
-            return self._measure(posterior, self.accurate, U)
-        return self._measure(self._searched(posterior), self.finer, U)
-
-    def _searched(self, posterior: Posterior) -> Posterior:
-        """Return the particles by which is searched: of a risk measure a part of them."""
-        return posterior if self.risk.name in ("mean", "worst") else posterior.thinned(SCREENING_DIVISOR)
+    def _improvement(self, posterior: Posterior) -> RiskImprovement:
+        """Return the expected risk measure, by the particles by which is searched."""
+        some = posterior if self.risk.name == "worst" else posterior.thinned(SCREENING_DIVISOR)
+        # The same draws at every call: the ranking must not depend on how often it was asked for.
+        return RiskImprovement(some, self.accurate, self.risk, None, np.random.default_rng(0))
 
     def _screening(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return about what `_measure` does: of what a part of the particles expects at the coarse perturbations."""
+        """Return about what `_measure` does: of what a part of the particles expects, by few perturbations."""
         few = posterior.thinned(SCREENING_DIVISOR)
         if self.risk.name == "mean":
             return self.coarse.outcome(few, U).mean.mean(axis=0)
-        moments, _ = self.coarse.spread(few, U)
-        return self.risk.measure(moments.mean.mean(axis=0).reshape(len(U), -1), self.coarse.quadrature.weights)
+        around = self.accurate.around(U)  # (q, s, d)
+        mean = means(few, around.reshape(-1, U.shape[1])).mean(axis=0).reshape(around.shape[:2])
+        return self.risk.measure(mean, self.accurate.quadrature.weights)
 
     def _order_of_tried(self, posterior: Posterior, history: History) -> NDArray[np.intp]:
         for known, tried, order in self._last:

@@ -47,7 +47,8 @@ class RiskAverse:
                 return found
             return np.concatenate([bound.to_try(found[0]), found])
         improvement = RiskImprovement(posterior.thinned(SCREENING_DIVISOR), accurate, risk, best, rng)
-        found = multistart(improvement, improvement, d, anchors, rng, regions, history.admission)
+        finest = improvement.corrected(self.ranking.finer)
+        found = multistart(improvement, improvement, d, anchors, rng, regions, history.admission, finest)
         if not len(found):
             return found
         return np.concatenate([where_to_look(posterior, found[0], accurate, self.ranking.coarse), found])

@@ -15,6 +15,7 @@ _LARGEST = 1e150  # the square of a larger number is infinite
 
 __all__ = [
     "FitDiagnostics",
+    "KnowsMeans",
     "LeavesOut",
     "Moments",
     "NoisySurrogate",
@@ -22,6 +23,7 @@ __all__ = [
     "Posterior",
     "Regions",
     "Surrogate",
+    "means",
     "mixture",
 ]
 
@@ -174,6 +176,15 @@ class NoisySurrogate(Surrogate, Protocol):
 
 
 @runtime_checkable
+class KnowsMeans(Protocol):
+    """A posterior that gives means alone in less time than `moments` takes."""
+
+    def means(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the means (m, q) at queries (q, d)."""
+        ...
+
+
+@runtime_checkable
 class LeavesOut(Protocol):
     """A posterior that can say what it would think of each of its trials without it."""
 
@@ -183,6 +194,11 @@ class LeavesOut(Protocol):
         The hyperparameters stay those that were learnt from all.
         """
         ...
+
+
+def means(posterior: Posterior, queries: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean of f (m, q) at queries (q, d) under each particle."""
+    return posterior.means(queries) if isinstance(posterior, KnowsMeans) else posterior.moments(queries).mean
 
 
 def mixture(moments: Moments) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -10,7 +10,8 @@ from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, Prior
 from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, correlation
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
-from surehold.optimization.surrogates.protocol import mixture
+from surehold.optimization.surrogates.protocol import means, mixture
+from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
 RADIAL = {
     "matern52": lambda scales: Matern(scales, nu=2.5),
@@ -180,6 +181,17 @@ def test_draws_of_many_queries_at_once_are_those_of_each_alone(learnt, clipped):
     alone = np.concatenate([learnt.sample(points[i : i + 1], normals) for i in range(5)], axis=1)
     np.testing.assert_allclose(together, alone, atol=1e-6)
     assert learnt.sample(points[:0], normals).shape == (len(together), 0, 4, 6)
+
+
+@pytest.mark.parametrize("kernel", ["matern52", "squared_exponential", "matern52_two_scales"])
+def test_means_alone_are_those_of_the_moments(kernel, data):
+    X, y, _ = data
+    queries = np.random.default_rng(1).uniform(-0.2, 1.2, (40, 2))
+    posterior = GaussianProcess(kernel=kernel, mean_variance=0.3).condition(X, 9.0 * y, np.random.default_rng(0))
+    np.testing.assert_allclose(posterior.means(queries), posterior.moments(queries).mean, rtol=1e-9)
+    tree = TreedGaussianProcess().condition(X, y, np.random.default_rng(0))
+    for any_one in (posterior, tree):
+        np.testing.assert_allclose(means(any_one, queries), any_one.moments(queries).mean, rtol=1e-9)
 
 
 def test_pending_trials_equal_a_refit_on_their_means(data):

@@ -17,6 +17,7 @@ from surehold.optimization.surrogates.gaussian_process.outputs import Standardiz
 from surehold.optimization.surrogates.gaussian_process.prediction import (
     average,
     factorize,
+    means,
     prior_variance,
     sample,
 )
@@ -179,6 +180,20 @@ class GaussianProcessPosterior:
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of f at queries (q, d)."""
         return self.average(queries, np.zeros((1, queries.shape[1])), np.ones(1), gradient)
+
+    def means(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the means (m, q) at queries (q, d), without their variances."""
+        parameters = self.hyperparameters
+        result = means(
+            np.ascontiguousarray(queries),
+            self.evidence.X,
+            parameters.inverse_l,
+            parameters.s2,
+            self.evidence.mean_variance,
+            self.evidence.kernel,
+            self.factors.alpha,
+        )
+        return self.outputs.shift + self.outputs.scale * result
 
     def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""

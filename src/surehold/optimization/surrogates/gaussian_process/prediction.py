@@ -35,7 +35,7 @@ from surehold.optimization.surrogates.gaussian_process.kernels import (
 from surehold.optimization.surrogates.gaussian_process.likelihood import data_covariance
 from surehold.store.kernels import njit
 
-__all__ = ["average", "factorize", "prior_variance", "sample"]
+__all__ = ["average", "factorize", "means", "prior_variance", "sample"]
 
 _LARGEST_REPAIR = 1e-2  # nugget ratio beyond which a factorization is given up
 _ALIKE = 1e-12  # box widths between perturbations that differ by rounding only
@@ -185,6 +185,21 @@ def average(Q, offsets, slopes, weights, prior, X, inverse_l, s2, mean_variance,
                         mean_gradient[j, i, k] += rate * t
                         variance_gradient[j, i, k] -= 2.0 * rate * u
     return mean, np.maximum(variance, 0.0), mean_gradient, variance_gradient
+
+
+@njit(cache=True)
+def means(Q, X, inverse_l, s2, mean_variance, kernel, alpha):
+    """Return the means (m, q) at Q (q, d): a variance takes n times as long."""
+    m, n = alpha.shape
+    Z = transposed(X)
+    result = np.empty((m, len(Q)))
+    C = np.empty(n)
+    for j in range(m):
+        level = mean_variance * alpha[j].sum()
+        for i in range(len(Q)):
+            correlations(kernel, Q[i], Z, inverse_l[j], C)
+            result[j, i] = level + s2[j] * product(alpha[j], C, n)
+    return result
 
 
 @njit(cache=True)
