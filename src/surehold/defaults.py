@@ -35,8 +35,9 @@ ANCHORS: Final = 3
 #: coarse ranking need only place the best input among the first 16. Never measured on its own; what a quadrature's
 #: ranking loses: python -m benchmarks.quadrature_error.
 SHORTLIST: Final = 16
-#: Of more tried inputs than this only those with the highest values are ranked by their outcome: an ask takes the same
-#: time whether there are a thousand or ten thousand. Never measured against other numbers; python -m benchmarks.growth.
+#: Of more tried inputs than this only those with the highest values are ranked by their outcome, and no risk measure is
+#: corrected: an ask takes the same time whether there are a thousand or ten thousand. Never measured against other
+#: numbers; python -m benchmarks.growth.
 CONTENDERS: Final = 400
 #: The coarse ranking, and the choice of the ascents' starts, use every (m // 3)-th of the m particles: numbers 0, 3, 6
 #: and 9 of the default 10, which are four; so does the whole search for a risk measure but the worst case, which with

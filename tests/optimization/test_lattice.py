@@ -6,6 +6,7 @@ from surehold.optimization.lattice import Lattice, LatticePosterior
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.protocol import means
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
 LEVELS = 5
@@ -34,6 +35,7 @@ def test_the_model_is_constant_within_a_cell(posteriors):
     for moments in (rounded.moments(U), rounded.moments(snap(U)), rounded.average(U, np.zeros((1, 2)), np.ones(1))):
         assert np.allclose(moments.mean, plain.moments(snap(U)).mean, rtol=0, atol=1e-9)
         assert np.allclose(moments.variance, plain.moments(snap(U)).variance, rtol=0, atol=1e-9)
+    assert np.allclose(means(rounded, U), plain.moments(snap(U)).mean, rtol=0, atol=1e-9)
 
 
 def test_perturbed_points_are_rounded_after_the_perturbation(posteriors):

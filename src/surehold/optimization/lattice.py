@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
-from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions
+from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions, means
 
 __all__ = ["Lattice", "LatticePosterior", "lattice_of"]
 
@@ -95,6 +95,10 @@ class LatticePosterior:
         return moments._replace(
             mean_gradient=moments.mean_gradient * smooth, variance_gradient=moments.variance_gradient * smooth
         )
+
+    def means(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the means (m, q) at the snapped queries (q, d)."""
+        return means(self.unrounded, self._lattice.snap(queries))
 
     def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return joint draws (m, q, b, s) of f at the snapped points (q, s, d)."""

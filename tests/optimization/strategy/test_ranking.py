@@ -77,6 +77,14 @@ def test_the_answer_by_a_risk_measure_is_that_of_the_finer_perturbations(risk, d
     assert lost[answer] < 0.02 < lost[alone]
 
 
+@pytest.mark.parametrize("most", [25, 24])
+def test_after_many_trials_a_risk_measure_is_not_corrected(most, posterior, monkeypatch):
+    monkeypatch.setattr("surehold.optimization.strategy.ranking.CONTENDERS", most)
+    ranking = ranking_of("cvar", finer=FINER)
+    assert ranking.correction(posterior) is (FINER if most == len(TRIED) else None)
+    assert ranking.order(posterior, TRIED)[0] == np.argmax(outcome(posterior, TRIED, "cvar"))
+
+
 def test_observed_values_decide_where_nothing_is_uncertain(posterior):
     points = Perturbations(exact(1))
     values = np.random.default_rng(1).random(len(TRIED))  # other values than the model's

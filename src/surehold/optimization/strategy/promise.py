@@ -32,7 +32,8 @@ def promise(ranking: Ranking, posterior: Posterior, history: History, rng: np.ra
     else:
         best, anchors = ranking.incumbent(posterior, history, scale)
         objective = screen = RiskImprovement(posterior, ranking.accurate, ranking.risk, float(best), rng)
-        finest = objective.corrected(ranking.finer)
+        finer = ranking.correction(posterior)
+        finest = None if finer is None else objective.corrected(finer)
     found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, history.admission, finest)
     objective = objective if finest is None else finest
     if history.admission is not None:

@@ -108,7 +108,7 @@ class Ranking:
             objective, screen, last = (_mean_outcome(posterior, rule) for rule in (self.accurate, self.coarse, finer))
         else:
             objective = screen = self._improvement(posterior)
-            last = objective.corrected(self.finer)
+            last = objective.corrected(self.correction(posterior))
         found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, admission)
         candidates = np.concatenate([anchors[:1], found[:ANCHORS]])
         if self.finer is not None and admission is None:
@@ -151,6 +151,10 @@ class Ranking:
             return None
         return self.risk.name, *self._measure(posterior, np.array([one, other])).tolist()
 
+    def correction(self, posterior: Posterior) -> Perturbations | None:
+        """Return the perturbations that correct a risk measure; None after many trials, of which means are dear."""
+        return self.finer if posterior.diagnostics.observations <= CONTENDERS else None
+
     @property
     def exact_inputs(self) -> bool:
         """Whether inputs are reached exactly."""
@@ -160,7 +164,7 @@ class Ranking:
         """Return the expected measure (q,) at U (q, d), the mean or a risk measure, which the finer ones correct."""
         if self.risk.name == "mean":
             return self.accurate.outcome(posterior, U).mean.mean(axis=0)
-        return self._improvement(posterior).corrected(self.finer).expectation(U)
+        return self._improvement(posterior).corrected(self.correction(posterior)).expectation(U)
 
     def _improvement(self, posterior: Posterior) -> RiskImprovement:
         """Return the expected risk measure, by the particles by which is searched."""
@@ -173,9 +177,10 @@ class Ranking:
         few = posterior.thinned(SCREENING_DIVISOR)
         if self.risk.name == "mean":
             return self.coarse.outcome(few, U).mean.mean(axis=0)
-        around = self.accurate.around(U)  # (q, s, d)
+        perturbations = self.coarse if self.correction(posterior) is None else self.accurate
+        around = perturbations.around(U)  # (q, s, d)
         mean = means(few, around.reshape(-1, U.shape[1])).mean(axis=0).reshape(around.shape[:2])
-        return self.risk.measure(mean, self.accurate.quadrature.weights)
+        return self.risk.measure(mean, perturbations.quadrature.weights)
 
     def _order_of_tried(self, posterior: Posterior, history: History) -> NDArray[np.intp]:
         for known, tried, order in self._last:

@@ -47,7 +47,8 @@ class RiskAverse:
                 return found
             return np.concatenate([bound.to_try(found[0]), found])
         improvement = RiskImprovement(posterior.thinned(SCREENING_DIVISOR), accurate, risk, best, rng)
-        finest = improvement.corrected(self.ranking.finer)
+        finer = self.ranking.correction(posterior)
+        finest = None if finer is None else improvement.corrected(finer)
         found = multistart(improvement, improvement, d, anchors, rng, regions, history.admission, finest)
         if not len(found):
             return found

@@ -73,6 +73,14 @@ class TreedPosterior:
         """Return the moments of f at queries (q, d)."""
         return self.average(queries, np.zeros((1, queries.shape[1])), np.ones(1), gradient)
 
+    def means(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the means (m, q) at queries (q, d), each of the leaf that owns it."""
+        home = self.partition.route(queries)
+        result = np.empty((len(self.leaves[0].hyperparameters.theta), len(queries)))
+        for leaf in np.unique(home):
+            result[:, home == leaf] = self.leaves[leaf].means(queries[home == leaf])
+        return result
+
     def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
         m = len(self.leaves[0].hyperparameters.theta)
@@ -165,6 +173,10 @@ class AveragedTrees:
     def moments(self, queries: NDArray[np.float64], gradient: bool = False) -> Moments:
         """Return the moments of f at queries (q, d)."""
         return self.average(queries, np.zeros((1, queries.shape[1])), np.ones(1), gradient)
+
+    def means(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the means (m, q) at queries (q, d)."""
+        return np.concatenate([tree.means(queries) for tree in self.trees])
 
     def sample(self, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return joint draws (m, q, b, s) of f at points (q, s, d), made from independent standard normals (b, s)."""
