@@ -130,7 +130,7 @@ CANDIDATES_IN_REGIONS: Final = 512
 STARTS_IN_REGIONS: Final = 6
 #: Evaluations, with gradient, of one ascent. Never measured on its own.
 ASCENT_EVALUATIONS: Final = 40
-#: Evaluations of the last ascent, by the corrected risk measure, which begins at the top by the uncorrected one.
+#: Evaluations of the ascent by a corrected risk measure, which begins at the best trial by it. Never measured.
 LAST_EVALUATIONS: Final = 10
 #: Length of an ascent's first step and of its longest one later, in box widths. Never measured.
 ASCENT_FIRST_STEP: Final = 0.05

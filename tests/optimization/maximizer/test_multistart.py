@@ -4,7 +4,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surehold.optimization.maximizer.multistart import multistart
-from surehold.optimization.surrogates.protocol import Regions
 
 
 class Function:
@@ -56,17 +55,6 @@ def test_multistart_finds_the_higher_of_two_peaks(d):
     for seed in range(5):
         found = multistart(f, f, d, np.full((1, d), 0.25), np.random.default_rng(seed))
         np.testing.assert_allclose(found[0], 0.8, atol=1e-3)
-
-
-def test_the_best_point_climbs_on_by_the_finest_objective():
-    """Inside its region only: the finest top lies in the neighboring one."""
-    f, finest = bowl([0.3, 0.6]), bowl([0.42, 0.7])
-    anchors, rng = np.full((1, 2), 0.5), np.random.default_rng
-    found = multistart(f, f, 2, anchors, rng(0), finest=finest)
-    np.testing.assert_allclose(found[:2], [[0.42, 0.7], [0.3, 0.6]], atol=1e-4)
-    halves = Regions(np.array([[0.0, 0.0], [0.4, 0.0]]), np.array([[0.4, 1.0], [1.0, 1.0]]))
-    found = multistart(f, f, 2, anchors, rng(0), halves, finest=finest)
-    np.testing.assert_allclose(found[0], [0.4, 0.7], atol=1e-4)
 
 
 def test_a_needle_is_found_from_an_anchor_on_its_flank():

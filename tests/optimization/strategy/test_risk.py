@@ -3,10 +3,11 @@ import pytest
 
 from surehold.defaults import SCREENING_DIVISOR
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement, WorstCaseBound
+from surehold.optimization.constraints.admission import Admission
 from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.noise.quadratures import quasi_monte_carlo, sigma_points
+from surehold.optimization.noise.quadratures import Quadrature, quasi_monte_carlo, sigma_points
 from surehold.optimization.strategy.ranking import History, Ranking
-from surehold.optimization.strategy.risk import RiskAverse
+from surehold.optimization.strategy.risk import RiskAverse, most_improving
 from surehold.optimization.strategy.trust_region import TrustRegion, side_after
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 
@@ -28,12 +29,29 @@ def test_the_candidate_improves_the_measure_most(name, posterior):
     ranking = Ranking(ACCURATE, COARSE, Risk(name), False)
     history = History(TRIED, VALUES, NONE, NONE)
     found = RiskAverse(ranking, 2.0).candidates(posterior, history, np.random.default_rng(5))
-    best, _ = ranking.incumbent(posterior, history, "robust")
     some = posterior.thinned(SCREENING_DIVISOR)
-    gain = RiskImprovement(some, ACCURATE, Risk(name), best, np.random.default_rng(5))
+    gain = RiskImprovement(some, ACCURATE, Risk(name), None, np.random.default_rng(5)).over(TRIED)
     top = found[5]  # behind the places at and beside it where a trial may tell most
     assert gain(top[None, :])[0] >= gain(GRID).max() - 1e-3
     assert np.any(np.all(found[:5] == top, axis=1))
+
+
+@pytest.mark.parametrize("finer", [None, Perturbations(quasi_monte_carlo(S, 9))])
+def test_what_many_perturbations_promise_is_compared_with_what_few_do(finer):
+    """Perturbations to one side only put the best place at 0.102, which has been tried; it is at 0.162."""
+    tried = np.append(np.linspace(0.0, 1.0, 21), 0.102)[:, None]
+    values = np.sin(9.0 * tried[:, 0]) - tried[:, 0]
+    posterior = GaussianProcess().fit(tried, values).posterior
+    one_sided = Perturbations(Quadrature(np.array([[0.0], [0.12]]), np.full(2, 0.5)))
+    ranking = Ranking(one_sided, COARSE, Risk("mean-std", beta=0.5), False, finer=finer)
+    history = History(tried, values, NONE, NONE)
+    best = ranking.shortlist(posterior, history)
+    found, gain = most_improving(ranking, posterior, best, history, np.random.default_rng(0), posterior.regions)
+    assert (abs(found[0, 0] - 0.162) < 5e-3) == (finer is not None)
+    assert 0.0 < gain < 1e-2
+    left = history._replace(admission=Admission(safe=lambda U: U[:, 0] < 0.155))
+    found, _ = most_improving(ranking, posterior, best, left, np.random.default_rng(0), posterior.regions)
+    assert found.max() < 0.155
 
 
 def test_the_worst_case_is_tried_where_it_is_worst(posterior):

@@ -121,6 +121,12 @@ class RiskImprovement:
         other._finer = finer
         return other
 
+    def over(self, points: NDArray[np.float64]) -> "RiskImprovement":
+        """Return the improvement upon the best of the points (q, d), by the same draws."""
+        other = copy(self)
+        other._best = float(self.expectation(points).max())
+        return other
+
     def values(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return draws of the risk measure (m b, q) at U (q, d)."""
         draws = self._posterior.sample(self._perturbations.around(U), self._normals)  # (m, q, b, s)

@@ -10,7 +10,6 @@ from surehold.defaults import (
     CANDIDATES_IN_REGIONS,
     COPIES,
     COPY_SCALES,
-    LAST_EVALUATIONS,
     SETTLING_COPIES,
     SETTLING_FIRST,
     SETTLING_ROUNDS,
@@ -45,7 +44,6 @@ def multistart(
     rng: np.random.Generator,
     regions: Regions | None = None,
     admission: Admits | None = None,
-    finest: Objective | None = None,
 ) -> NDArray[np.float64]:
     """Return points (c, d) worth trying, best first: gradient ascents from a Sobol sequence and perturbed anchors.
 
@@ -59,8 +57,6 @@ def multistart(
         Boxes, together a box, in each of which candidates are laid and which no ascent leaves; None: the whole cube.
     admission
         Which points can be tried; None: all. Only such are returned: none at all, (0, d), where none is found.
-    finest
-        The objective computed more exactly, by which the best point climbs on a little; None: it does not.
     """
     regions = regions or Regions.whole(dimension)
     points = promising(dimension, anchors, rng, regions)
@@ -77,15 +73,10 @@ def multistart(
         starts = sorted({*leaders.tolist(), *starts})
     tops, values = climb(objective, points[starts], regions.lower[home[starts]], regions.upper[home[starts]])
     order = np.argsort(-values, kind="stable")
-    tops, home = tops[order], home[starts][order]
     if admission is not None:  # ascents stop at a border which is no box's; the best one goes along it
-        tops = np.concatenate([_settled(objective, tops[0], float(values[order[0]]), rng)[None, :], tops])
-    if finest is not None:
-        finest = finest if admission is None else admission.weighed(finest)
-        box = regions.lower[home[:1]], regions.upper[home[:1]]
-        last, _ = climb(finest, tops[:1], *box, LAST_EVALUATIONS)
-        tops = np.concatenate([last, tops])
-    return np.concatenate([tops, points])
+        tops = np.concatenate([_settled(objective, tops[order[0]], float(values[order[0]]), rng)[None, :], tops[order]])
+        return np.concatenate([tops, points])
+    return np.concatenate([tops[order], points])
 
 
 def _settled(

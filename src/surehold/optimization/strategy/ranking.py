@@ -121,24 +121,24 @@ class Ranking:
             return np.argsort(-self._values(posterior, history), kind="stable")
         return self._order_of_tried(posterior, history)
 
+    def shortlist(self, posterior: Posterior, history: History) -> NDArray[np.float64]:
+        """Return the best tried inputs (a, d), best first."""
+        return history.tried[self._order_of_tried(posterior, history)[:SHORTLIST]]
+
     def incumbent(self, posterior: Posterior, history: History, scale: Scale) -> tuple[Any, NDArray[np.float64]]:
-        """Return the value to improve upon, a number or (m, 1), one per particle; and the best tried inputs (a, d)."""
+        """Return the mean to improve upon, a number or (m, 1), one per particle; and the best tried inputs (a, d)."""
         if scale == "exact":
             values = self._values(posterior, history)
             return float(values.max()), history.tried[np.argsort(-values, kind="stable")[:ANCHORS]]
         anchors = history.tried[self._order_of_tried(posterior, history)[:ANCHORS]]
-        if self.risk.name != "mean":
-            return float(self._measure(posterior, anchors[:1])[0]), anchors
         best = self.accurate.outcome(posterior, anchors[:1]).mean  # (m, 1)
         return best if scale == "robust" else float(best.mean()), anchors
 
     def believed(self, posterior: Posterior, pending: NDArray[np.float64], scale: Scale) -> Any:
-        """Return the best value that trials under way (p, d) are believed to give, as `incumbent` does.
+        """Return the best mean that trials under way (p, d) are believed to give, as `incumbent` does.
 
         Without it a second trial would be sent to the top on which the first one is on its way.
         """
-        if self.risk.name != "mean":
-            return self._measure(posterior, pending).max()
         perturbations = Perturbations(exact(pending.shape[1])) if scale == "exact" else self.accurate
         mean = perturbations.outcome(posterior, pending).mean  # (m, p)
         return mean.mean(axis=0).max() if scale == "unscented" else mean.max(axis=1, keepdims=True)

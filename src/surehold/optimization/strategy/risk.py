@@ -6,15 +6,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import SCREENING_DIVISOR
+from surehold.defaults import ANCHORS, LAST_EVALUATIONS, SCREENING_DIVISOR
 from surehold.optimization.acquisition.risk_measures import RiskImprovement, WorstCaseBound
 from surehold.optimization.acquisition.where_to_look import where_to_look
+from surehold.optimization.maximizer.ascent import climb
 from surehold.optimization.maximizer.multistart import multistart
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.strategy.trust_region import TrustRegion
-from surehold.optimization.surrogates.protocol import Posterior
+from surehold.optimization.surrogates.protocol import Posterior, Regions
 
-__all__ = ["RiskAverse"]
+__all__ = ["RiskAverse", "most_improving"]
 
 
 @dataclass(frozen=True)
@@ -32,24 +33,60 @@ class RiskAverse:
     def candidates(self, posterior: Posterior, history: History, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return points of the cube (c, d) for the next trial, best first."""
         accurate, risk = self.ranking.accurate, self.ranking.risk
-        best, anchors = self.ranking.incumbent(posterior, history, "robust")
+        best = self.ranking.shortlist(posterior, history)
         if len(history.pending):
             posterior = posterior.with_pending(history.pending)
-            best = max(best, float(self.ranking.believed(posterior, history.pending, "robust")))
         regions = posterior.regions
         if self.trust_region is not None:
-            regions = self.trust_region.within(regions, anchors[0], history.observed)
-        d = anchors.shape[1]
+            regions = self.trust_region.within(regions, best[0], history.observed)
         if risk.name == "worst":
             bound = WorstCaseBound(posterior, accurate, self.kappa)
-            found = multistart(bound, bound, d, anchors, rng, regions, history.admission)
+            found = multistart(bound, bound, best.shape[1], best[:ANCHORS], rng, regions, history.admission)
             if not len(found):
                 return found
             return np.concatenate([bound.to_try(found[0]), found])
-        improvement = RiskImprovement(posterior.thinned(SCREENING_DIVISOR), accurate, risk, best, rng)
-        finer = self.ranking.correction(posterior)
-        finest = None if finer is None else improvement.corrected(finer)
-        found = multistart(improvement, improvement, d, anchors, rng, regions, history.admission, finest)
+        some = posterior.thinned(SCREENING_DIVISOR)
+        found, _ = most_improving(self.ranking, some, best, history, rng, regions)
         if not len(found):
             return found
         return np.concatenate([where_to_look(posterior, found[0], accurate, self.ranking.coarse), found])
+
+
+def most_improving(
+    ranking: Ranking,
+    posterior: Posterior,
+    best: NDArray[np.float64],
+    history: History,
+    rng: np.random.Generator,
+    regions: Regions,
+) -> tuple[NDArray[np.float64], float]:
+    """Return points of the cube (c, d), the one first that improves a risk measure most, and what it is expected to.
+
+    The search is by the few perturbations of the ranking, over the best known place by these. The best place by more of
+    them lies a little beside; what a climb from the best known place by more promises is compared with what the
+    search does. Nothing can be tried: no points, and no improvement.
+
+    Parameters
+    ----------
+    posterior
+        With pending trials taken in.
+    best : (a, d)
+        The best tried inputs, best first.
+    """
+    measure = RiskImprovement(posterior, ranking.accurate, ranking.risk, None, rng)
+    improvement = measure.over(np.concatenate([best, history.pending]))
+    found = multistart(improvement, improvement, best.shape[1], best[:ANCHORS], rng, regions, history.admission)
+    if not len(found):
+        return found, 0.0
+    finer = ranking.correction(posterior)
+    corrected = None if finer is None else measure.corrected(finer).over(np.concatenate([best[:1], history.pending]))
+    if history.admission is not None:
+        improvement = history.admission.weighed(improvement)
+        corrected = None if corrected is None else history.admission.weighed(corrected)
+    gain = float(improvement(found[:1])[0])
+    if corrected is not None:
+        lower, upper = regions.lower.min(axis=0)[None, :], regions.upper.max(axis=0)[None, :]
+        top, value = climb(corrected, best[:1], lower, upper, LAST_EVALUATIONS)
+        if value[0] > gain:
+            return np.concatenate([top, found]), float(value[0])
+    return found, gain
