@@ -19,7 +19,7 @@ from scipy.stats import qmc
 
 import surehold as sh
 from benchmarks.rule_regret import EXACT, best_by, measure, smooth
-from surehold.optimization.acquisition.risk_measures import RiskImprovement
+from surehold.optimization.strategy.ranking import Ranking
 
 BUDGETS = {1: 30, 2: 50, 3: 70}
 
@@ -40,7 +40,7 @@ def compared(seed):
     *_, box, _, risk = problem = smooth(seed)
     exactly = measure(*problem, EXACT)
     answers = [searched(seed)]
-    with patch.object(RiskImprovement, "corrected", lambda self, finer: self):
+    with patch.object(Ranking, "correction", lambda self, posterior: None):
         answers.append(searched(seed))
     places = np.array([x for x, _ in answers] + [best_by(*problem, EXACT, np.array([x for x, _ in answers]))])
     values = np.concatenate([exactly(x) for x in places])

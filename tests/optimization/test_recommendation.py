@@ -108,13 +108,13 @@ def test_why_the_highest_is_refused_is_said_by_the_measure_that_decided():
 
 
 def test_one_that_is_worth_as_much_by_the_measure_is_said_to_be():
-    """The hill is steeper on its right, by so little that .5005 is higher than .5 and worth .0002 less of 10.877."""
+    """The hill is steeper on its right, by so little that .5005 is higher than .5 and worth .0001 less of 10.878."""
 
     def hill(x):
-        return 11.0 - 50.0 * (x - 0.5003) ** 2 - 4.0 * (x - 0.5003) ** 3
+        return 11.0 - 50.0 * (x - 0.5003) ** 2 - 40.0 * (x - 0.5003) ** 3
 
     refused = refused_by_value_at_risk(hill, np.r_[np.linspace(0.0, 1.0, 41), 0.5005])
-    assert "is worth no more than the recommended one: its 'var' is 10.877, too" in refused
+    assert "is worth no more than the recommended one: its 'var' is 10.878, too" in refused
 
 
 def test_a_place_that_is_worth_as_much_is_no_worse():
