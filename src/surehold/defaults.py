@@ -31,9 +31,9 @@ DESIGN_VARIABLES_PER_MORE: Final = 5
 #: Best tried inputs around which the maximizer lays candidates. One may sit on a hill that is not the highest.
 #: Never measured.
 ANCHORS: Final = 3
-#: Inputs, the best by the coarse ranking, that are ranked again with all particles and the accurate quadrature. The
-#: coarse ranking need only place the best input among the first 16. Never measured on its own; what a quadrature's
-#: ranking loses: python -m benchmarks.quadrature_error.
+#: Inputs, the best by the coarse ranking, that are ranked again with all particles and the accurate quadrature, or by a
+#: corrected risk measure with a part of them. The coarse ranking need only place the best input among the first 16.
+#: Never measured on its own; what a quadrature's ranking loses: python -m benchmarks.quadrature_error.
 SHORTLIST: Final = 16
 #: Of more tried inputs than this only those with the highest values are ranked by their outcome, and no risk measure is
 #: corrected: an ask takes the same time whether there are a thousand or ten thousand. Never measured against other

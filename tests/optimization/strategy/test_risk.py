@@ -46,11 +46,11 @@ def test_what_many_perturbations_promise_is_compared_with_what_few_do(finer):
     ranking = Ranking(one_sided, COARSE, Risk("mean-std", beta=0.5), False, finer=finer)
     history = History(tried, values, NONE, NONE)
     best = ranking.shortlist(posterior, history)
-    found, gain = most_improving(ranking, posterior, best, history, np.random.default_rng(0), posterior.regions)
+    found, gain = most_improving(ranking, posterior, best, finer, history, np.random.default_rng(0), posterior.regions)
     assert (abs(found[0, 0] - 0.162) < 5e-3) == (finer is not None)
     assert 0.0 < gain < 1e-2
     left = history._replace(admission=Admission(safe=lambda U: U[:, 0] < 0.155))
-    found, _ = most_improving(ranking, posterior, best, left, np.random.default_rng(0), posterior.regions)
+    found, _ = most_improving(ranking, posterior, best, finer, left, np.random.default_rng(0), posterior.regions)
     assert found.max() < 0.155
 
 

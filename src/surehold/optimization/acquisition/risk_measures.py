@@ -132,7 +132,9 @@ class RiskImprovement:
         draws = self._posterior.sample(self._perturbations.around(U), self._normals)  # (m, q, b, s)
         rho = self._risk.measure(draws, self._perturbations.quadrature.weights)
         if self._finer is not None:
-            rho += (self._of_mean(self._finer, U) - self._of_mean(self._perturbations, U))[:, :, None]
+            few, many = self._of_mean(self._perturbations, U), self._of_mean(self._finer, U)
+            sound = np.isfinite(few) & np.isfinite(many)  # a variance of huge values is infinite
+            rho += np.subtract(many, few, out=np.zeros_like(few), where=sound)[:, :, None]
         return np.swapaxes(rho, 1, 2).reshape(-1, len(U))
 
     def expectation(self, U: NDArray[np.float64]) -> NDArray[np.float64]:

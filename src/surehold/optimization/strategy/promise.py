@@ -24,8 +24,8 @@ def promise(ranking: Ranking, posterior: Posterior, history: History, rng: np.ra
         return float("inf")
     if ranking.risk.name not in ("mean", "worst"):
         history = history._replace(pending=history.pending[:0])
-        best = ranking.shortlist(posterior, history)
-        return max(most_improving(ranking, posterior, best, history, rng, posterior.regions)[1], 0.0)
+        best, finer = ranking.shortlist(posterior, history), ranking.correction(posterior)
+        return max(most_improving(ranking, posterior, best, finer, history, rng, posterior.regions)[1], 0.0)
     scale: Scale = "exact" if ranking.exact_inputs else "robust"
     best, anchors = replace(ranking, risk=Risk()).incumbent(posterior, history, scale)
     objective, screen = (

@@ -3,7 +3,7 @@
 Legend
     U         points of the unit cube, (q, d)
     accurate  quadrature by which outcomes under the input noise are computed
-    coarse    sigma points: cheap, good enough to choose the inputs that are ranked again
+    coarse    sigma points: cheap, good enough to choose the inputs whose mean is computed again
     finer     quadrature with more points than the accurate one: too dear for a search, not for its last step
     outcome   UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over perturbations i and particles j     thesis (3.21)
 """
@@ -62,7 +62,7 @@ class Ranking:
     noisy: bool
     """whether observations carry noise, so that the highest one is no incumbent"""
     screened: bool = True
-    """whether the coarse perturbations and a part of the particles choose which inputs are ranked accurately"""
+    """whether fewer perturbations and a part of the particles choose which inputs are ranked accurately"""
     finer: Perturbations | None = None
     """what the best one anywhere climbs on by, and what corrects a risk measure; None: nothing"""
     _last: list[tuple[Posterior, NDArray[np.float64], NDArray[np.intp]]] = field(
@@ -99,15 +99,16 @@ class Ranking:
     ) -> NDArray[np.float64]:
         """Return the point of the cube (d,) with the best modelled outcome; `tried` (n, d) guide the search.
 
-        The best of those found climb on by the finer perturbations, which decide: a measure by few of them is highest a
-        little beside the best place.
+        The best of those found climb on by the finer perturbations, by the corrected measure where there is a risk, and
+        these decide: a measure by few of them is highest a little beside the best place.
         """
         anchors = tried[self.order(posterior, tried)[:ANCHORS]]
         if self.risk.name == "mean":
             finer = self.accurate if self.finer is None else self.finer
             objective, screen, last = (_mean_outcome(posterior, rule) for rule in (self.accurate, self.coarse, finer))
         else:
-            objective = screen = self._improvement(posterior)
+            some = posterior if self.risk.name == "worst" else posterior.thinned(SCREENING_DIVISOR)
+            objective = screen = self._expected(some)
             last = objective.corrected(self.correction(posterior))
         found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, admission)
         candidates = np.concatenate([anchors[:1], found[:ANCHORS]])
@@ -164,13 +165,14 @@ class Ranking:
         """Return the expected measure (q,) at U (q, d), the mean or a risk measure, which the finer ones correct."""
         if self.risk.name == "mean":
             return self.accurate.outcome(posterior, U).mean.mean(axis=0)
-        return self._improvement(posterior).corrected(self.correction(posterior)).expectation(U)
+        finer = self.correction(posterior)
+        if finer is None:
+            return self._expected(posterior).expectation(U)
+        return self._expected(posterior.thinned(SCREENING_DIVISOR)).corrected(finer).expectation(U)
 
-    def _improvement(self, posterior: Posterior) -> RiskImprovement:
-        """Return the expected risk measure, by the particles by which is searched."""
-        some = posterior if self.risk.name == "worst" else posterior.thinned(SCREENING_DIVISOR)
+    def _expected(self, posterior: Posterior) -> RiskImprovement:
         # The same draws at every call: the ranking must not depend on how often it was asked for.
-        return RiskImprovement(some, self.accurate, self.risk, None, np.random.default_rng(0))
+        return RiskImprovement(posterior, self.accurate, self.risk, None, np.random.default_rng(0))
 
     def _screening(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return about what `_measure` does: of what a part of the particles expects, by few perturbations."""

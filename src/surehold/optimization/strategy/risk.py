@@ -11,6 +11,7 @@ from surehold.optimization.acquisition.risk_measures import RiskImprovement, Wor
 from surehold.optimization.acquisition.where_to_look import where_to_look
 from surehold.optimization.maximizer.ascent import climb
 from surehold.optimization.maximizer.multistart import multistart
+from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.strategy.trust_region import TrustRegion
 from surehold.optimization.surrogates.protocol import Posterior, Regions
@@ -33,7 +34,7 @@ class RiskAverse:
     def candidates(self, posterior: Posterior, history: History, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return points of the cube (c, d) for the next trial, best first."""
         accurate, risk = self.ranking.accurate, self.ranking.risk
-        best = self.ranking.shortlist(posterior, history)
+        best, finer = self.ranking.shortlist(posterior, history), self.ranking.correction(posterior)
         if len(history.pending):
             posterior = posterior.with_pending(history.pending)
         regions = posterior.regions
@@ -46,7 +47,7 @@ class RiskAverse:
                 return found
             return np.concatenate([bound.to_try(found[0]), found])
         some = posterior.thinned(SCREENING_DIVISOR)
-        found, _ = most_improving(self.ranking, some, best, history, rng, regions)
+        found, _ = most_improving(self.ranking, some, best, finer, history, rng, regions)
         if not len(found):
             return found
         return np.concatenate([where_to_look(posterior, found[0], accurate, self.ranking.coarse), found])
@@ -56,15 +57,16 @@ def most_improving(
     ranking: Ranking,
     posterior: Posterior,
     best: NDArray[np.float64],
+    finer: Perturbations | None,
     history: History,
     rng: np.random.Generator,
     regions: Regions,
 ) -> tuple[NDArray[np.float64], float]:
     """Return points of the cube (c, d), the one first that improves a risk measure most, and what it is expected to.
 
-    The search is by the few perturbations of the ranking, over the best known place by these. The best place by more of
-    them lies a little beside; what a climb from the best known place by more promises is compared with what the
-    search does. Nothing can be tried: no points, and no improvement.
+    The search is by the few perturbations of the ranking, over the best of `best` by these. The best place by more of
+    them lies a little beside; what a climb from the first of `best` by more of them promises over that one is compared
+    with what the search does. Nothing can be tried: no points, and no improvement.
 
     Parameters
     ----------
@@ -72,21 +74,23 @@ def most_improving(
         With pending trials taken in.
     best : (a, d)
         The best tried inputs, best first.
+    finer
+        Perturbations that correct the measure; None: nothing does.
     """
     measure = RiskImprovement(posterior, ranking.accurate, ranking.risk, None, rng)
     improvement = measure.over(np.concatenate([best, history.pending]))
     found = multistart(improvement, improvement, best.shape[1], best[:ANCHORS], rng, regions, history.admission)
     if not len(found):
         return found, 0.0
-    finer = ranking.correction(posterior)
-    corrected = None if finer is None else measure.corrected(finer).over(np.concatenate([best[:1], history.pending]))
-    if history.admission is not None:
-        improvement = history.admission.weighed(improvement)
-        corrected = None if corrected is None else history.admission.weighed(corrected)
-    gain = float(improvement(found[:1])[0])
-    if corrected is not None:
-        lower, upper = regions.lower.min(axis=0)[None, :], regions.upper.max(axis=0)[None, :]
-        top, value = climb(corrected, best[:1], lower, upper, LAST_EVALUATIONS)
-        if value[0] > gain:
-            return np.concatenate([top, found]), float(value[0])
+    admission = history.admission
+    gain = float((improvement if admission is None else admission.weighed(improvement))(found[:1])[0])
+    start = (best if admission is None else best[admission.possible(best)])[:1]
+    if finer is None or not len(start):
+        return found, gain
+    corrected = measure.corrected(finer).over(np.concatenate([best[:1], history.pending]))
+    objective = corrected if admission is None else admission.weighed(corrected)
+    lower, upper = regions.lower.min(axis=0)[None, :], regions.upper.max(axis=0)[None, :]
+    top, value = climb(objective, start, lower, upper, LAST_EVALUATIONS)
+    if value[0] > gain:
+        return np.concatenate([top, found]), float(value[0])
     return found, gain
