@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import ANCHORS, LAST_EVALUATIONS, SCREENING_DIVISOR
+from surehold.defaults import ANCHORS, LAST_EVALUATIONS, SCREENING_DIVISOR, STARTS
 from surehold.optimization.acquisition.risk_measures import RiskImprovement, WorstCaseBound
 from surehold.optimization.acquisition.where_to_look import where_to_look
 from surehold.optimization.maximizer.ascent import climb
@@ -64,9 +64,9 @@ def most_improving(
 ) -> tuple[NDArray[np.float64], float]:
     """Return points of the cube (c, d), the one first that improves a risk measure most, and what it is expected to.
 
-    The search is by the few perturbations of the ranking, over the best of `best` by these. The best place by more of
-    them lies a little beside; what a climb from the first of `best` by more of them promises over that one is compared
-    with what the search does. Nothing can be tried: no points, and no improvement.
+    The search is by the few perturbations of the ranking. The best place by more of them lies a little beside: there
+    a climb by more of them ends, from the first of `best`. That place and the tops of the search are compared by
+    more of them. Nothing can be tried: no points, and no improvement.
 
     Parameters
     ----------
@@ -78,19 +78,18 @@ def most_improving(
         Perturbations that correct the measure; None: nothing does.
     """
     measure = RiskImprovement(posterior, ranking.accurate, ranking.risk, None, rng)
-    improvement = measure.over(np.concatenate([best, history.pending]))
-    found = multistart(improvement, improvement, best.shape[1], best[:ANCHORS], rng, regions, history.admission)
+    known = np.concatenate([best, history.pending])
+    improvement, admission = measure.over(known), history.admission
+    found = multistart(improvement, improvement, best.shape[1], best[:ANCHORS], rng, regions, admission)
     if not len(found):
         return found, 0.0
-    admission = history.admission
-    gain = float((improvement if admission is None else admission.weighed(improvement))(found[:1])[0])
-    start = (best if admission is None else best[admission.possible(best)])[:1]
-    if finer is None or not len(start):
-        return found, gain
-    corrected = measure.corrected(finer).over(np.concatenate([best[:1], history.pending]))
+    corrected = measure.corrected(finer).over(known)
     objective = corrected if admission is None else admission.weighed(corrected)
-    lower, upper = regions.lower.min(axis=0)[None, :], regions.upper.max(axis=0)[None, :]
-    top, value = climb(objective, start, lower, upper, LAST_EVALUATIONS)
-    if value[0] > gain:
-        return np.concatenate([top, found]), float(value[0])
-    return found, gain
+    tops, start = found[:STARTS], (best if admission is None else best[admission.possible(best)])[:1]
+    if finer is not None and len(start):
+        lower, upper = regions.lower.min(axis=0)[None, :], regions.upper.max(axis=0)[None, :]
+        beside, _ = climb(objective, start, lower, upper, LAST_EVALUATIONS)
+        tops = np.concatenate([beside, tops])
+    gains = objective(tops)
+    order = np.argsort(-gains, kind="stable")
+    return np.concatenate([tops[order], found[STARTS:]]), float(gains[order[0]])
