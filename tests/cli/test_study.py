@@ -14,6 +14,8 @@ def hill(x):
     return 1.0 - float(((x - 0.3) ** 2).sum())
 def by_name(p):
     return p["n"] - (p["grip"] == "power")
+def unplugged(x):
+    raise RuntimeError("no robot here")
 """
 
 
@@ -151,6 +153,13 @@ def test_a_worker_by_command(study, capsys):
     study("create r --problem rkhs --initial 3")
     assert run(["study", "work", "r", "--trials", "3"]) == 0
     assert "Done: 3 trials" in capsys.readouterr().out
+
+
+def test_a_worker_all_of_whose_trials_failed_says_so(study, capsys):
+    study("create dead --parameters a=0:1 --initial 6 --problem own.py:unplugged")
+    assert run(["study", "work", "dead", "--trials", "2"]) == 1
+    assert "Done: 2 trials by this worker, all failed." in capsys.readouterr().out
+    assert run(["study", "work", "dead", "--trials", "1", "--function", "own.py:hill"]) == 0
 
 
 @pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])

@@ -30,7 +30,10 @@ def work(
     ] = 120.0,
     storage: Storage = "",
 ) -> None:
-    """Make trials until the study stops (see `study stop`); start as many workers as wanted."""
+    """Make trials until the study stops (see `study stop`); start as many workers as wanted.
+
+    Ends with exit code 1 where all trials of this worker failed.
+    """
     from surehold.cli.compilation import announced
     from surehold.cli.interruption import terminable
     from surehold.cli.terminal import terminal
@@ -42,11 +45,12 @@ def work(
 
     with terminable(), announced(console):
         attempt = trial_function(problem_of(study.settings, function), study.settings.space)
-        count = 0
+        count = failures = 0
 
         def show(asked: Any, outcome: Any) -> None:
-            nonlocal count
+            nonlocal count, failures
             count += 1
+            failures += bool(outcome.failure)
             said = f"failed: {outcome.failure}" if outcome.failure else f"{outcome.value:.6g}"
             console.print(f"trial {asked.id}{' (again)' * asked.again}: {said}", markup=False, soft_wrap=True)
 
@@ -55,7 +59,10 @@ def work(
         except KeyboardInterrupt:
             console.print(f"Ended after {amount(count, 'trial')}; the one under way is let go.", markup=False)
             raise SystemExit(130) from None  # typer.Exit(130) reads as an interruption with nothing to keep
-    console.print(f"Done: {amount(count, 'trial')} by this worker.", markup=False)
+    failed = f", {'all' if failures == count else failures} failed" * bool(failures)
+    console.print(f"Done: {amount(count, 'trial')} by this worker{failed}.", markup=False)
+    if failures and failures == count:
+        raise typer.Exit(1)
 
 
 def serve(
