@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 import surehold as sh
-from surehold.optimization.recommendation import in_digits
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.recommendation import expectation_at, in_digits
 
 LINE = sh.Box({"x": (-1.0, 1.0)})
 
@@ -102,7 +103,7 @@ def test_why_the_highest_is_refused_is_said_by_the_measure_that_decided():
         return 1.5 * np.exp(-0.5 * ((x - 0.2) / 0.01) ** 2) + np.exp(-0.5 * ((x - 0.7) / 0.1) ** 2)
 
     refused = refused_by_value_at_risk(spike_and_hill, np.r_[np.linspace(0.0, 1.0, 21), 0.18, 0.19, 0.21, 0.22])
-    assert "its 'var' is" in refused
+    assert "its 10 % quantile is" in refused
     of_highest, of_recommended = (float(number) for number in re.findall(r"(?:is|one) (-?[\d.]*\d)", refused)[-2:])
     assert of_highest < of_recommended
 
@@ -114,7 +115,48 @@ def test_one_that_is_worth_as_much_by_the_measure_is_said_to_be():
         return 11.0 - 50.0 * (x - 0.5003) ** 2 - 40.0 * (x - 0.5003) ** 3
 
     refused = refused_by_value_at_risk(hill, np.r_[np.linspace(0.0, 1.0, 41), 0.5005])
-    assert "is worth no more than the recommended one: its 'var' is 10.878, too" in refused
+    assert "is worth no more than the recommended one: its 10 % quantile is 10.878, too" in refused
+
+
+@pytest.mark.parametrize(("direction", "sign"), [("maximize", 1.0), ("minimize", -1.0)])
+def test_what_the_answer_is_worth_by_the_measure_is_stated_with_it(direction, sign):
+    """A sure model of a parabola: the mean less two variances of (x + e)^2 is a noncentral chi-squared one's."""
+    noise, x = 0.05, np.linspace(-1.0, 1.0, 41)
+    risk = sh.Risk("mean-variance", beta=2.0)
+    box = sh.Box({"x": (-1.0, 1.0)})
+    optimizer = sh.Optimizer(box, input_noise=sh.InputNoise({"x": noise}), risk=risk, direction=direction, seed=0)
+    optimizer.restore(x[:, None], -sign * x**2)
+
+    def worth(at):
+        law = stats.ncx2(1, (at / noise) ** 2)
+        return -sign * (noise**2 * law.mean() + 2.0 * noise**4 * law.var())
+
+    assert optimizer.risk == risk
+    np.testing.assert_allclose(optimizer.risk_measure([[0.0], [0.5]]), [worth(1e-9), worth(0.5)], rtol=1e-2)
+    best = optimizer.recommend()
+    assert best.by_risk == best.worth == pytest.approx(optimizer.risk_measure(best.x)[0])
+    assert f"by_risk={best.by_risk:.6g}" in repr(best)
+    plain = sh.Optimizer(box, input_noise=sh.InputNoise({"x": noise}), seed=0)
+    plain.restore(x[:, None], -(x**2))
+    assert plain.recommend().by_risk is None
+    assert plain.recommend().worth == plain.recommend().mean
+    assert plain.risk_measure([[0.0]])[0] == pytest.approx(plain.predict([[0.0]], under_noise=True)[0][0])
+
+
+def test_the_stated_mean_is_as_sure_as_its_average():
+    """Of a sine under normal noise the mean is known; the model is sure of it to more digits than 128 points are."""
+    noise = 0.04
+    optimizer = sh.Optimizer(LINE, input_noise=sh.InputNoise({"x": noise}), seed=0)
+    x = np.linspace(0.0, 1.0, 21)
+    optimizer.restore(x[:, None], np.sin(9.0 * x))
+    best = optimizer.recommend()
+    exactly = float(np.sin(9.0 * best.x[0]) * np.exp(-0.5 * (9.0 * noise) ** 2))
+    few = Perturbations.of(sh.InputNoise({"x": noise}), LINE, "quasi_monte_carlo", exponent=7)
+    coarse = expectation_at(optimizer.posterior, few, best.x)
+    assert abs(coarse.mean - exactly) > 10.0 * coarse.std
+    assert abs(best.mean - exactly) < 2.0 * best.expectation.std
+    assert abs(best.mean - exactly) < 0.5 * abs(coarse.mean - exactly)
+    assert best.expectation.std < 3e-3
 
 
 def test_a_place_that_is_worth_as_much_is_no_worse():

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.defaults import FEASIBLE, KAPPA, OUTCOME_EXPONENT
+from surehold.defaults import CONTENDERS, FEASIBLE, FEW_VARIABLES, KAPPA, MEAN_EXPONENT_OF_FEW, OUTCOME_EXPONENT
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.asking import Asking, history_of
@@ -198,6 +198,7 @@ class Optimizer(Record):
         self.input_noise: Final = parts.input_noise
         self.seed: Final = parts.seed
         self.n_initial: Final = parts.n_initial
+        self.risk: Final = parts.strategy.ranking.risk
         self._lattice: Final = parts.lattice
         self._strategy: Final = parts.strategy
         self._model: Final = parts.model
@@ -310,14 +311,9 @@ class Optimizer(Record):
             posterior = self.posterior
             if not len(history.tried) and self._requirements is not None:
                 where, history = "observed", self._requirements.nearest(self._trials)
-            reached = Perturbations.of(
-                self.input_noise,
-                self.box,
-                "quasi_monte_carlo",
-                ranking.accurate.border,
-                exponent=OUTCOME_EXPONENT,
-                allowed=ranking.accurate.allowed,
-            )
+            reached = self._reached(OUTCOME_EXPONENT)
+            few = self.box.dimension <= FEW_VARIABLES and posterior.diagnostics.observations <= CONTENDERS
+            finer = self._reached(MEAN_EXPONENT_OF_FEW) if few and not ranking.exact_inputs else None
             if where == "observed":
                 index = int(ranking.order(posterior, history.tried, history.observed)[0])
                 u, observed = history.tried[index], float(history.observed[index])
@@ -334,6 +330,7 @@ class Optimizer(Record):
             answer = recommendation(
                 posterior,
                 reached,
+                finer,
                 ranking.coarse,
                 u,
                 self.box,
@@ -344,6 +341,7 @@ class Optimizer(Record):
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
                 self._model.execution_noise(self._trials),
                 "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
+                self.risk,
                 ranking.judged(posterior, highest[0], u),
             )
             if self._requirements is not None:
@@ -360,6 +358,15 @@ class Optimizer(Record):
         with computing():
             mean, variance = mixture(perturbations.outcome(self.posterior, U))
         return self._sign * mean, np.sqrt(variance)
+
+    def risk_measure(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Return what X (q, d), in the box's units, is expected to be worth by the `risk` that was asked for, (q,).
+
+        Under the input noise; by default its mean. Raises InputError if no trial has given a value yet.
+        """
+        U = np.atleast_2d(self.box.to_unit(X))
+        with computing():
+            return self._sign * self._ranking.measure(self.posterior, U)
 
     def preferred(self, x: Any, other: Any) -> float:
         """Return the probability that one judgement prefers x to `other`, both (d,) in the box's units.
@@ -421,6 +428,18 @@ class Optimizer(Record):
     @property
     def _history(self) -> History:
         return history_of(self._trials, self._requirements, self._trials.modelled)
+
+    def _reached(self, exponent: int) -> Perturbations:
+        """Return 2**exponent quasi-random perturbations of the input noise."""
+        accurate = self._ranking.accurate
+        return Perturbations.of(
+            self.input_noise,
+            self.box,
+            "quasi_monte_carlo",
+            accurate.border,
+            exponent=exponent,
+            allowed=accurate.allowed,
+        )
 
     def _snapped(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         return U if self._lattice is None else self._lattice.snap(U)

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.surrogates.protocol import Posterior
+from surehold.optimization.surrogates.protocol import Posterior, means
 
 __all__ = [
     "OUTSIDE",
@@ -124,6 +125,8 @@ class Recommendation:
         Why no feasible input is known and what came nearest; empty where one is. `x` is the nearest then.
     outputs : dict
         {name: Outcome} of the further outputs of one execution.
+    by_risk
+        What x is expected to be worth by the risk measure that was asked for; None where that is the mean.
     """
 
     x: NDArray[np.float64]
@@ -142,10 +145,18 @@ class Recommendation:
     feasible: float = 1.0
     infeasible: str = ""
     outputs: Mapping[str, Outcome] = field(default_factory=dict)
+    by_risk: float | None = None
 
     def __repr__(self) -> str:
         mean, quantile = (in_digits(value, self.std, 6) for value in (self.mean, self.quantile))
-        return f"Recommendation({place(self.x, self.parameters)}, mean={mean}, std={self.std:.3g}, quantile={quantile})"
+        risk = "" if self.by_risk is None else f", by_risk={in_digits(self.by_risk, self.std, 6)}"
+        found = f"{place(self.x, self.parameters)}, mean={mean}, std={self.std:.3g}, quantile={quantile}{risk}"
+        return f"Recommendation({found})"
+
+    @property
+    def worth(self) -> float:
+        """What x is expected to be worth by what was asked for: `by_risk`, or the mean."""
+        return self.mean if self.by_risk is None else self.by_risk
 
     def probability_below(self, value: float) -> float:
         """Return the probability that the next execution gives less than `value`."""
@@ -198,15 +209,26 @@ def execution_at(
     return Outcome(moments.mean.ravel(), np.sqrt(moments.variance + noise).ravel(), each)
 
 
-def expectation_at(posterior: Posterior, reached: Perturbations, u: NDArray[np.float64]) -> Outcome:
-    """Return what the model knows of the mean of many executions at u (d,)."""
+def expectation_at(
+    posterior: Posterior, reached: Perturbations, u: NDArray[np.float64], finer: Perturbations | None = None
+) -> Outcome:
+    """Return what the model knows of the mean of many executions at u (d,).
+
+    What the finer perturbations of the same noise make of each particle's mean is the better average; by how much they
+    move it is added to its deviation: a model that is sure to five digits does not make the average so.
+    """
     moments = reached.outcome(posterior, u[None, :])
-    return Outcome(moments.mean.ravel(), np.sqrt(moments.variance).ravel())
+    mean, variance = moments.mean.ravel(), moments.variance.ravel()
+    if finer is None:
+        return Outcome(mean, np.sqrt(variance))
+    few, many = (means(posterior, rule.around(u[None, :])[0]) @ rule.quadrature.weights for rule in (reached, finer))
+    return Outcome(mean + many - few, np.hypot(np.sqrt(variance), many - few))
 
 
 def recommendation(
     posterior: Posterior,
     reached: Perturbations,
+    finer: Perturbations | None,
     sigma_points: Perturbations,
     u: NDArray[np.float64],
     box: Box,
@@ -217,18 +239,20 @@ def recommendation(
     outliers: tuple[int, ...] = (),
     noise_variance: float | None = None,
     warning: str = "",
-    by_risk: tuple[str, float, float] | None = None,
+    risk: Risk | None = None,
+    by_risk: tuple[float, float] | None = None,
 ) -> Recommendation:
     """Describe u (d,) of the unit cube; `highest` is where the best observed trial was, and its value.
 
-    `sign` is that of the values in which the answer is given: -1 where what was told has been turned over. `by_risk` is
-    the risk measure by which u was chosen, if it is not the mean, and what `highest` and u are worth by it.
+    `reached` are the perturbations of one execution, `finer` more of them, for its mean. `sign` is that of the values
+    in which the answer is given: -1 where what was told has been turned over. `risk` is the measure by which u was
+    chosen, and `by_risk` what `highest` and u are worth by it; None: the mean.
     """
     outcome = execution_at(posterior, reached, u, noise_variance)
-    expectation = expectation_at(posterior, reached, u)
+    expectation = expectation_at(posterior, reached, u, finer)
     moments, _ = sigma_points.spread(posterior, u[None, :])
-    means, weights = moments.mean.mean(axis=0), sigma_points.quadrature.weights
-    spread = means - weights @ means
+    near, weights = moments.mean.mean(axis=0), sigma_points.quadrature.weights
+    spread = near - weights @ near
     unit = float(np.abs(spread).max()) or 1.0  # squares may overflow
     variance = weights @ (spread / unit) ** 2
     refused = ""
@@ -241,23 +265,27 @@ def recommendation(
         refused = f"The {best} observed trial gave {said(highest[1])}, but {OUTSIDE}"
     elif np.any(np.abs(highest[0] - u) > 1e-6):
         other = execution_at(posterior, reached, highest[0], noise_variance)
+        expected = expectation_at(posterior, reached, highest[0], finer).mean
         refused = f"The {best} observed trial gave {said(highest[1])}, but under the noise "
-        if by_risk is not None and said(by_risk[1]) == said(by_risk[2]):
-            refused += f"it is worth no more than the recommended one: its '{by_risk[0]}' is {said(by_risk[2])}, too."
-        elif by_risk is not None:
-            refused += f"its '{by_risk[0]}' is {said(by_risk[1])}, that of the recommended one {said(by_risk[2])}."
-        elif other.mean >= outcome.mean or said(other.mean) == said(outcome.mean):
-            refused += f"it is worth no more than the recommended one: {said(outcome.mean)} is expected."
+        if risk is not None and by_risk is not None:
+            one, another, words = said(by_risk[0]), said(by_risk[1]), risk.words(sign < 0.0)
+            refused += (
+                f"it is worth no more than the recommended one: its {words} is {another}, too."
+                if one == another
+                else f"its {words} is {one}, that of the recommended one {another}."
+            )
+        elif expected >= expectation.mean or said(expected) == said(expectation.mean):
+            refused += f"it is worth no more than the recommended one: {said(expectation.mean)} is expected."
         else:
             refused += (
-                f"{said(other.mean)} is expected, and {worse} than {said(other.quantile(_LEVEL))} once in twenty "
-                f"executions; of the recommended one {said(outcome.mean)} is expected, and {worse} than "
+                f"{said(expected)} is expected, and {worse} than {said(other.quantile(_LEVEL))} once in twenty "
+                f"executions; of the recommended one {said(expectation.mean)} is expected, and {worse} than "
                 f"{said(outcome.quantile(_LEVEL))} once in twenty."
             )
     x = box.from_unit(u)
     return Recommendation(
         x,
-        sign * outcome.mean,
+        sign * expectation.mean,
         outcome.std,
         sign * outcome.quantile(_LEVEL),
         sign * observed,
@@ -269,6 +297,7 @@ def recommendation(
         Outcome(sign * outcome.means, outcome.stds, outcome.weights),
         Outcome(sign * expectation.means, expectation.stds),
         box.as_dict(x),
+        by_risk=None if by_risk is None else sign * by_risk[1],
     )
 
 

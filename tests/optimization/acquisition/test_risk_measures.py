@@ -50,6 +50,59 @@ def unsure():
 # --- the measures -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("text", "risk", "words", "of_costs"),
+    [
+        ("mean", Risk(), "mean", "mean"),
+        (
+            "mean-std=2",
+            Risk("mean-std", beta=2.0),
+            "mean less 2 standard deviations",
+            "mean plus 2 standard deviations",
+        ),
+        ("mean-variance", Risk("mean-variance"), "mean less 1 variance", "mean plus 1 variance"),
+        (" var = 0.2 ", Risk("var", alpha=0.2), "20 % quantile", "80 % quantile"),
+        ("cvar=0.05", Risk("cvar", alpha=0.05), "mean of the worst 5 %", "mean of the worst 5 %"),
+        ("worst", Risk("worst"), "worst case", "worst case"),
+    ],
+)
+def test_measures_as_text(text, risk, words, of_costs):
+    assert Risk.parse(text) == risk
+    assert Risk.parse(str(risk)) == risk
+    assert (risk.words(), risk.words(minimized=True)) == (words, of_costs)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("cvarr", "did you mean 'cvar'"),
+        ("cvarr=0.1", "did you mean 'cvar'"),
+        ("cvar=2", "strictly between 0 and 1"),
+        ("cvar=", "'' is not a number"),
+        ("mean-std=much", "'much' is not a number"),
+        ("mean-std=-1", "0 or more"),
+        ("worst=2", "'worst' has no parameter"),
+    ],
+)
+def test_texts_that_are_no_measure(text, message):
+    with pytest.raises(InputError, match=message):
+        Risk.parse(text)
+
+
+def test_what_executions_are_worth():
+    values = np.random.default_rng(4).gamma(2.0, 1.0, 400)
+    ordered = np.sort(values)
+    assert Risk("cvar", alpha=0.1).of_executions(values) == pytest.approx(ordered[:40].mean())
+    assert Risk("cvar", alpha=0.1).of_executions(values, minimized=True) == pytest.approx(ordered[-40:].mean())
+    assert Risk("var", alpha=0.1).of_executions(values) == np.quantile(values, 0.1, method="inverted_cdf")
+    assert Risk("mean-std", beta=2.0).of_executions(values, minimized=True) == pytest.approx(
+        values.mean() + 2.0 * values.std()
+    )
+    assert Risk("worst").of_executions(values) == ordered[0]
+    assert Risk().of_executions(values) == pytest.approx(values.mean())
+    assert np.isnan(Risk().of_executions(np.empty(0)))
+
+
 @pytest.mark.parametrize("alpha", [0.05, 0.1, 0.5, 0.9])
 def test_normal_outcomes(alpha):
     """Of N(2, 0.5^2), as 100,000 equally likely quantiles."""

@@ -26,6 +26,7 @@ __all__ = ["RISKS", "Risk", "RiskImprovement", "WorstCaseBound"]
 
 RISKS: Final = ("mean", "mean-std", "mean-variance", "var", "cvar", "worst")
 _UNWEIGHTED: Final = ("mean", "worst")  # measures that a negative weight does no harm
+_PARAMETERS: Final = {"mean-std": "beta", "mean-variance": "beta", "var": "alpha", "cvar": "alpha"}
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,53 @@ class Risk:
             raise InputError(
                 f"beta is {self.beta!r}; give a finite number of standard deviations or variances, 0 or more."
             )
+
+    @classmethod
+    def parse(cls, text: str) -> "Risk":
+        """Return the measure of a text: a name, or a name and its parameter, such as "cvar=0.05", "mean-std=2".
+
+        Raises InputError for an unknown name, and for a parameter that is none, or out of range.
+        """
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            return cls(name)
+        parameter = _PARAMETERS.get(name)
+        if parameter is None:
+            if name in RISKS:
+                raise InputError(f"risk {text!r}: '{name}' has no parameter; write {name}.")
+            raise unknown_name("risk", name, RISKS)
+        try:
+            number = float(value)
+        except ValueError:
+            raise InputError(f"risk {text!r}: {value!r} is not a number; write for example {name}=0.2.") from None
+        return cls(name, **{parameter: number})
+
+    def __str__(self) -> str:
+        parameter = _PARAMETERS.get(self.name)
+        return self.name if parameter is None else f"{self.name}={getattr(self, parameter):g}"
+
+    def words(self, minimized: bool = False) -> str:
+        """Return the measure in words, such as "mean of the worst 10 %"; `minimized`: where low values are good."""
+        share = 1.0 - self.alpha if minimized else self.alpha
+        several = "" if self.beta == 1.0 else "s"
+        taken_off = f"mean {'plus' if minimized else 'less'} {self.beta:g}"
+        return {
+            "mean": "mean",
+            "mean-std": f"{taken_off} standard deviation{several}",
+            "mean-variance": f"{taken_off} variance{several}",
+            "var": f"{100.0 * share:g} % quantile",
+            "cvar": f"mean of the worst {100.0 * self.alpha:g} %",
+            "worst": "worst case",
+        }[self.name]
+
+    def of_executions(self, values: NDArray[np.floating], minimized: bool = False) -> float:
+        """Return what executions that gave these values (q,) are worth; NaN where there are none."""
+        if not len(values):
+            return float("nan")
+        sign = -1.0 if minimized else 1.0
+        return sign * float(
+            self.measure(sign * np.asarray(values, dtype=np.float64), np.full(len(values), 1.0 / len(values)))
+        )
 
     def check_weights(self, weights: NDArray[np.float64], rule: str = "") -> None:
         """Raise InputError where the measure needs weights of 0 or more and the quadrature `rule` has others."""

@@ -84,10 +84,10 @@ class Ranking:
             by_value = _latest_of_equals(observed)
             likely = by_value[:CONTENDERS]
             return np.concatenate([likely[self.order(posterior, U[likely])], by_value[CONTENDERS:]])
-        first = self._screening(posterior, U) if self.screened else self._measure(posterior, U)
+        first = self._screening(posterior, U) if self.screened else self.measure(posterior, U)
         order = np.argsort(-first, kind="stable")
         top = order[:SHORTLIST]
-        order[:SHORTLIST] = top[np.argsort(-self._measure(posterior, U[top]), kind="stable")]
+        order[:SHORTLIST] = top[np.argsort(-self.measure(posterior, U[top]), kind="stable")]
         return order
 
     def best(
@@ -144,13 +144,23 @@ class Ranking:
         mean = perturbations.outcome(posterior, pending).mean  # (m, p)
         return mean.mean(axis=0).max() if scale == "unscented" else mean.max(axis=1, keepdims=True)
 
+    def measure(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the expected measure (q,) at U (q, d), the mean or a risk measure, which the finer ones correct."""
+        if self.risk.name == "mean":
+            return self.accurate.outcome(posterior, U).mean.mean(axis=0)
+        finer = self.correction(posterior)
+        if finer is None:
+            return self._expected(posterior).expectation(U)
+        return self._expected(posterior.thinned(SCREENING_DIVISOR)).corrected(finer).expectation(U)
+
     def judged(
         self, posterior: Posterior, one: NDArray[np.float64], other: NDArray[np.float64]
-    ) -> tuple[str, float, float] | None:
-        """Return the name of the risk measure and what it is at two points (d,); None where the mean decides."""
+    ) -> tuple[float, float] | None:
+        """Return what two points (d,) are worth by the risk measure; None where the mean decides."""
         if self.risk.name == "mean" or self.exact_inputs:
             return None
-        return self.risk.name, *self._measure(posterior, np.array([one, other])).tolist()
+        one_is, other_is = self.measure(posterior, np.array([one, other])).tolist()
+        return one_is, other_is
 
     def correction(self, posterior: Posterior) -> Perturbations | None:
         """Return the perturbations that correct a risk measure; None after many trials, of which means are dear."""
@@ -161,21 +171,12 @@ class Ranking:
         """Whether inputs are reached exactly."""
         return len(self.accurate.quadrature.weights) == 1
 
-    def _measure(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the expected measure (q,) at U (q, d), the mean or a risk measure, which the finer ones correct."""
-        if self.risk.name == "mean":
-            return self.accurate.outcome(posterior, U).mean.mean(axis=0)
-        finer = self.correction(posterior)
-        if finer is None:
-            return self._expected(posterior).expectation(U)
-        return self._expected(posterior.thinned(SCREENING_DIVISOR)).corrected(finer).expectation(U)
-
     def _expected(self, posterior: Posterior) -> RiskImprovement:
         # The same draws at every call: the ranking must not depend on how often it was asked for.
         return RiskImprovement(posterior, self.accurate, self.risk, None, np.random.default_rng(0))
 
     def _screening(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return about what `_measure` does: of what a part of the particles expects, by few perturbations."""
+        """Return about what `measure` does: of what a part of the particles expects, by few perturbations."""
         few = posterior.thinned(SCREENING_DIVISOR)
         if self.risk.name == "mean":
             return self.coarse.outcome(few, U).mean.mean(axis=0)
