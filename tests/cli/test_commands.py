@@ -71,6 +71,9 @@ def here(tmp_path, monkeypatch):
         ("maximize rkhs --noise nan", "nan"),
         ("maximize rkhs --noise lots", "is not a number"),
         ("maximize rkhs --noise none", "needs input noise"),
+        ("maximize rkhs --risk cvarr", "did you mean 'cvar'"),
+        ("maximize rkhs --risk cvar=2", "strictly between 0 and 1"),
+        ("maximize rkhs --risk cvar --method bo", "which method 'bo' does not know"),
         ("maximize gm --noise x1=0.1", "says nothing about x2"),
         ("maximize gm --noise x1=0.1,y=0.1", "'y' is unknown"),
         ("maximize gm --bounds a=0:1", "has its own bounds"),
@@ -133,6 +136,32 @@ def test_no_noise_at_all(here, capsys):
     assert data["candidates"][0]["requeries"]["values"] == []
     assert "No re-queries" in (here / "runs" / "gf-bo-seed0" / "report.html").read_text(encoding="utf-8")
     capsys.readouterr()
+
+
+def test_a_run_is_judged_by_the_risk_measure_it_was_asked_for(here, capsys):
+    line = "maximize rkhs --trials 9 --initial 7 --noise 0.03 --out out --requeries 40"
+    assert surehold(f"{line} --risk cvar=0.2 --study s") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "asked for is the mean of the worst 20 %" in told
+    assert "mean of the worst 20 % of them" in told
+    data = json.loads((here / "out" / "result.json").read_text())
+    assert data["settings"]["risk"] == "cvar=0.2"
+    answer = data["candidates"][-1]
+    assert answer["worth"] == pytest.approx(sum(sorted(answer["requeries"]["values"])[:8]) / 8)
+    assert data["robust"][-1] == answer["predicted_worth"]
+    assert surehold("study recommend s --json") == 0
+    stored = json.loads(capsys.readouterr().out)
+    assert stored["by_risk"] == pytest.approx(answer["predicted_worth"])
+    assert stored["risk"] == "mean of the worst 20 %"
+    assert surehold("study recommend s") == 0
+    assert f"mean of the worst 20 % {answer['predicted_worth']:.4g}" in capsys.readouterr().out
+
+
+def test_a_published_problem_is_run_under_its_own_risk_measure(here, capsys):
+    assert surehold("maximize qing-branin --trials 6 --initial 5 --out out --requeries 10") == 0
+    assert "asked for is the mean less 0.5 variances" in " ".join(capsys.readouterr().out.split())
+    assert surehold("maximize qing-branin --trials 6 --initial 5 --out out --requeries 10 --risk mean") == 0
+    assert "asked for" not in capsys.readouterr().out
 
 
 def test_trials_that_raise_are_failures_and_the_run_goes_on(here, capsys):

@@ -9,7 +9,8 @@ from surehold.problems import GaussianBumps, robust_score
 from surehold.reports import gather
 from surehold.reports.plots import result_report
 from surehold.reports.surfaces import surfaces_of
-from surehold.reports.verdict import coordinates, verdict
+from surehold.reports.verdict import verdict
+from surehold.reports.wording import coordinates
 
 
 def test_answers_and_traces(gm_result, gm_report):

@@ -10,7 +10,8 @@ from surehold.errors import InputError
 from surehold.reports.figures import figures
 from surehold.reports.page import render, table_rows
 from surehold.reports.plots import result_report
-from surehold.reports.verdict import coordinates, verdict
+from surehold.reports.verdict import verdict
+from surehold.reports.wording import coordinates, worth
 
 BOX = sh.Box({"force": (0.1, 10.0, "log"), "grip": ["pinch", "power"]})
 
@@ -47,6 +48,27 @@ def test_without_the_function_the_model_stands_for_it(result):
     assert report.recommended.values.size == 0
     assert report.recommended.predicted_mean == result.recommendation.mean
     assert result_report(result, needle).recommended.values.size == 100
+
+
+def test_under_a_risk_measure_everything_that_compares_is_of_that():
+    """The spike is at .8; of the mean of the worst tenth it has nothing."""
+    box, risk = sh.Box({"x": (0.0, 1.0)}), sh.Risk("cvar", alpha=0.1)
+    found = sh.maximize(needle, box, 14, n_initial=8, seed=0, input_noise=sh.InputNoise.unit(0.05), risk=risk)
+    optimizer, best = found.optimizer, found.recommendation
+    silent, shaken = result_report(found), result_report(found, needle)
+    assert silent.recommended.predicted_worth == best.by_risk == pytest.approx(optimizer.risk_measure(best.x)[0])
+    assert silent.robust_trace is not None
+    assert silent.robust_trace[-1] == best.by_risk
+    assert silent.settings["risk"] == "cvar=0.1"
+    tail = np.sort(shaken.recommended.values)[:10].mean()
+    assert shaken.recommended.worth == pytest.approx(tail)
+    rows = dict(table_rows(shaken))
+    assert rows["mean of the worst 10 % of them"][-1] == worth(shaken, tail, 4)
+    assert rows["model: mean of the worst 10 %"][-1] == worth(shaken, best.by_risk, 4)
+    page = render(shaken)
+    assert f"recommended: expected {risk.words()}" in page
+    assert f"(◆ {risk.words()} {worth(shaken, tail)})" in page
+    assert f"{risk.words()}</dt>" in page, "the glossary has it"
 
 
 def test_the_page_is_written_from_python(result, tmp_path):

@@ -1,10 +1,13 @@
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.reports.run_report import Candidate, RunReport, Variable
-from surehold.reports.verdict import change, coordinates, number, verdict
+from surehold.reports.verdict import verdict
+from surehold.reports.wording import change, coordinates, number
 
 
 def report(*candidates, **changes):
@@ -150,6 +153,60 @@ def test_a_better_mean_with_a_worse_tail_says_both():
     told = verdict(report(with_tail("highest observed", 5.5, 4.0, 3.9), with_tail("recommended", 4.95, 4.9, 1.38)))
     assert "worth only 4.00" in told.headline
     assert "but falls to 1.38 at worst" in told.headline
+
+
+def averse(candidate, risk, predicted=None):
+    return replace(candidate, risk=risk, predicted_worth=predicted)
+
+
+def test_a_run_that_was_asked_for_a_risk_measure_is_judged_by_it():
+    """The highest point has the higher mean; what the run was asked for is the mean of the worst tenth."""
+    rng = np.random.default_rng(3)
+    gamble, sound = 3.0 + 2.0 * rng.standard_normal(200), 2.5 + 0.1 * rng.standard_normal(200)
+    pair = shaken("highest observed", 5.0, gamble), shaken("recommended", 2.6, sound)
+    assert not verdict(report(*pair)).refused
+    told = verdict(report(*(averse(candidate, Risk("cvar")) for candidate in pair)))
+    worst = [np.sort(values)[:20].mean() for values in (gamble, sound)]
+    assert told.refused
+    assert f"worth only {number(worst[0])} by the mean of the worst 10 %, the recommended point" in told.headline
+    assert f"the recommended point {number(worst[1])}." in told.headline
+    assert f"The mean of the worst 10 % of them is {number(worst[1])}." in told.text
+    assert f"By the mean of the worst 10 % they differ by {number(worst[1] - worst[0])} (" in told.text
+    turned = verdict(report(*(averse(c, Risk("cvar")) for c in (shaken("highest observed", 5.0, sound), pair[0]))))
+    assert "do not bear it out" in turned.headline
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_the_standard_error_of_a_measure_is_that_of_normal_samples(paired):
+    """Of s from n normal values it is sigma / sqrt(2 n), of the mean sigma / sqrt(n), and they are independent."""
+    rng, n = np.random.default_rng(1), 4000
+    one, other = rng.standard_normal((2, n))
+    risk = Risk("mean-std", beta=2.0)
+    pair = shaken("highest observed", 5.0, one), shaken("recommended", 3.0, 1.0 + other)
+    if not paired:
+        pair = pair[0], replace(pair[1], n_failed=3)
+    told = verdict(report(*(averse(candidate, risk) for candidate in pair)))
+    error = float(re.search(r"standard error ([\d.]+)", told.text)[1])
+    assert error == pytest.approx(np.sqrt(2.0 * (1.0 / n + 4.0 / (2.0 * n))), rel=0.15)
+
+
+def test_points_that_are_worth_the_same_are_said_to_be_whatever_the_error():
+    values = 4.0 + 0.1 * SPREAD
+    told = verdict(report(shaken("highest observed", 5.0, values), shaken("recommended", 4.9, values + 1e-5)))
+    assert "about the same: 4.00 and 4.00 on average" in told.headline
+    worst = [averse(shaken(name, 5.0, values), Risk("worst")) for name in ("highest observed", "recommended")]
+    assert verdict(report(*worst)).headline.endswith("about the same: 3.90 and 3.90 at worst.")
+
+
+def test_without_re_queries_the_model_says_what_the_measure_is():
+    pair = [
+        replace(averse(shaken(name, 3.0, []), Risk("var", alpha=0.2), worth), predicted_mean=mean)
+        for name, worth, mean in (("highest observed", -1.5, 2.0), ("recommended", 1.25, 1.5))
+    ]
+    told = verdict(report(*pair, robust_trace=np.ones(4)))
+    assert "expects −1.50 of it by the 20 % quantile, and 1.25 of the recommended point" in told.headline
+    pair = [replace(candidate, minimized=True) for candidate in pair]
+    assert "by the 80 % quantile" in verdict(report(*pair, minimized=True)).headline
 
 
 def test_without_any_success_nobody_wins():

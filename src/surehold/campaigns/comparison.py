@@ -14,7 +14,7 @@ from surehold.campaigns.statistics import LEVEL, Paired, Summary, holm, p_agains
 from surehold.campaigns.table import Records
 from surehold.campaigns.thesis import CLAIMS, Claim, exhibit_of
 from surehold.problems.synthetic import SYNTHETIC, synthetic_function
-from surehold.reports.verdict import number
+from surehold.reports.wording import number
 
 __all__ = ["ClaimResult", "Comparison", "Row", "claim_results", "comparisons", "final_values", "measures_of", "rows_of"]
 

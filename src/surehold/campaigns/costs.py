@@ -6,7 +6,7 @@ from surehold.campaigns.comparison import rows_of
 from surehold.campaigns.published import ORIGINAL_SECONDS
 from surehold.campaigns.table import Records
 from surehold.reports.campaign_report import Table
-from surehold.reports.verdict import number
+from surehold.reports.wording import number
 
 __all__ = ["cost_table", "total_cost_table"]
 

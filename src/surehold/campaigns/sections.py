@@ -20,7 +20,7 @@ from surehold.campaigns.comparison import (
 from surehold.campaigns.table import Records
 from surehold.campaigns.thesis import OPEN_PLACES, exhibit_of
 from surehold.reports.campaign_report import Band, Line, Mark, Panel, Picture, Section, Table
-from surehold.reports.verdict import number
+from surehold.reports.wording import number
 
 __all__ = [
     "campaign_section",

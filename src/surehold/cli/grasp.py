@@ -22,12 +22,14 @@ from surehold.cli.options import (
     Out,
     Preset,
     Requeries,
+    RiskMeasure,
     Seed,
     Study,
     StudyStorage,
     Trials,
     checked_method,
     noise_of,
+    risk_of,
 )
 from surehold.errors import InputError, unknown_name
 
@@ -89,6 +91,7 @@ def grasp(
     trials: Trials = 100,
     initial: Initial = 40,
     noise: Noise = "0.03",
+    risk: RiskMeasure = "",
     seed: Seed = 0,
     preset: Preset = "",
     out: Out = "",
@@ -205,6 +208,7 @@ def grasp(
         quality_name="held (physics)" if outcome == "held" else quality_name(problem),
         outcome="success" if outcome == "held" else "value",
         disturbance="the hand is off",
+        risk=risk_of(risk, method),
         success_above=0.0,
         outcomes=statuses,
         advice=advice_for(problem),

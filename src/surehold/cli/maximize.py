@@ -17,6 +17,7 @@ from surehold.cli.options import (
     Out,
     Preset,
     Requeries,
+    RiskMeasure,
     Safety,
     Seed,
     Study,
@@ -26,6 +27,7 @@ from surehold.cli.options import (
     checked_method,
     limits_given,
     noise_of,
+    risk_of,
 )
 
 __all__ = ["maximize"]
@@ -65,6 +67,7 @@ def maximize(
     trials: Trials = None,
     initial: Initial = None,
     noise: Noise = None,
+    risk: RiskMeasure = "",
     seed: Seed = 0,
     surrogate: Surrogate = "",
     preset: Preset = "",
@@ -98,6 +101,7 @@ def maximize(
     defaults = defaults_of(problem)
     noise_text = defaults.noise if noise is None else noise
     input_noise = own_noise(problem) if noise_text == "own" else noise_of(noise_text, method)
+    asked = risk_of(risk, method) or (own_risk(problem) if method == "ubo" else None)
 
     from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
     from surehold.optimization.optimizer import Optimizer
@@ -127,6 +131,7 @@ def maximize(
         },
         direction=direction,
         outcome=outcome,
+        risk=asked,
         tolerate_failures=tolerate_failures,
         kept=kept,
         required=limits_given(constraint, allowed, feasible, failures, safety, first)
@@ -161,6 +166,13 @@ def own_noise(problem: str) -> Any:
     if noise is None:
         raise InputError(f"problem '{problem}' states no input noise of its own; give --noise, such as 0.03.")
     return noise
+
+
+def own_risk(problem: str) -> Any:
+    """Return the risk measure under which a robust problem's best place is sought; None for other problems."""
+    from surehold.problems.named import has_own_noise, robust_problem
+
+    return robust_problem(problem).measure if has_own_noise(problem) else None
 
 
 def problem_of(text: str, bounds: str) -> Any:

@@ -21,6 +21,7 @@ __all__ = [
     "Out",
     "Preset",
     "Requeries",
+    "RiskMeasure",
     "Safety",
     "Seed",
     "Study",
@@ -31,6 +32,7 @@ __all__ = [
     "limits_given",
     "noise_of",
     "numbers_given",
+    "risk_of",
 ]
 
 METHODS = {
@@ -103,6 +105,15 @@ First = Annotated[
     list[str] | None,
     typer.Option(help="To be tried first, NAME=VALUE,... of all variables. Repeatable.", show_default=False),
 ]
+RiskMeasure = Annotated[
+    str,
+    typer.Option(
+        "--risk",
+        help="What is asked of the outcome under the noise: mean, mean-std, mean-variance, var, cvar or worst; with a "
+        "parameter cvar=0.05 (share of worst outcomes) or mean-std=2.",
+        show_default=False,
+    ),
+]
 Noise = Annotated[
     str | None,
     typer.Option(
@@ -141,6 +152,23 @@ def noise_of(text: str, method: str) -> InputNoise | None:
             raise InputError(f"--noise names {name!r} twice; give each variable once.")
         deviations[name] = _number(value)
     return InputNoise(deviations)
+
+
+def risk_of(text: str, method: str) -> Any:
+    """Return the `Risk` that `--risk` describes, None where nothing is said.
+
+    Raises InputError for an unknown measure, a wrong parameter, and with a method that knows no noise.
+    """
+    from surehold.optimization.acquisition.risk_measures import Risk
+
+    if not text:
+        return None
+    risk = Risk.parse(text)
+    if method == "bo" and risk.name != "mean":
+        raise InputError(
+            f"--risk {text} is of the outcome under input noise, which method 'bo' does not know; use ubo."
+        )
+    return risk
 
 
 def _number(text: str) -> float:

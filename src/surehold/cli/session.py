@@ -22,12 +22,14 @@ from surehold.cli.options import METHODS, REQUERIES
 from surehold.cli.requeries import requeried
 from surehold.cli.terminal import terminal
 from surehold.errors import InputError, SureholdError
+from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.maximization import Result, Trial, maximize
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.problem import Problem
 from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
-from surehold.reports.verdict import number, verdict
+from surehold.reports.verdict import verdict
+from surehold.reports.wording import number
 from surehold.store.atomic import checked_folder
 from surehold.store.leftovers import listed_writes
 
@@ -88,6 +90,7 @@ def run_session(
     advice: str = "",
     kept: Kept | None = None,
     required: Mapping[str, Any] | None = None,
+    risk: Risk | None = None,
     requeries: int = REQUERIES,
     console: Console | None = None,
 ) -> RunReport:
@@ -95,8 +98,9 @@ def run_session(
 
     A run that is kept as a study is resumed where that exists.
 
-    `required` are further settings of an `Optimizer`: surrogate, and those of constraints and failures. `requeries` are
-    those of each point that is shown, with the noise.
+    `required` are further settings of an `Optimizer`: surrogate, and those of constraints and failures. `risk` is what
+    is asked of the outcome under the noise, by default its mean. `requeries` are those of each point that is shown,
+    with the noise.
 
     `describe` adds to a candidate what the problem knows of it; `also_write` writes further files. Where no trial is
     worth more than `success_above`, the report says so first, with the counts of `outcomes` and `advice`; what the
@@ -123,6 +127,7 @@ def run_session(
             raise InputError(
                 f"--initial is {initial}, but --trials is {trials}; give at least as many trials as initial ones."
             )
+        risk = risk or Risk()
         options: dict[str, Any] = {
             "input_noise": noise if method == "ubo" else None,
             "n_initial": initial,
@@ -133,11 +138,14 @@ def run_session(
         }
         if outcome != "value":
             options["outcome"] = outcome
+        if risk.name != "mean":
+            options["risk"] = risk
         if noise is not None:
             noise.unit_covariance(problem.box)  # names and sizes are checked before anything runs
+        measure = f"; asked for is the {risk.words(direction == 'minimize')}" * (risk.name != "mean")
         console.print(
             f"[bold]{_plain(title)}[/bold]: {amount(trials, 'trial')} ({initial} initial), seed {seed}; "
-            f"method {method} {METHODS[method]}"
+            f"method {method} {METHODS[method]}{measure}"
         )
         with announced(console):
             warm_up(problem, options, console)
@@ -214,7 +222,7 @@ def _with_progress(
     with _progress(trials, options, console) as show:
 
         def told(trial: Trial) -> None:
-            robust = None if trial.recommendation is None else trial.recommendation.mean
+            robust = None if trial.recommendation is None else trial.recommendation.worth
             show(trial.index + 1, trial.best, robust)
 
         function = getattr(problem, "trial", problem)
@@ -256,7 +264,7 @@ def _as_study(
             finished = [t for t in study.trials() if t.state.is_finished()]
             values = [t.values[0] for t in finished if t.values]
             modelled = values and len(finished) >= options["n_initial"]
-            robust = study.recommend(write=False).mean if modelled else None
+            robust = study.recommend(write=False).worth if modelled else None
             show(len(finished), best(values, default=np.nan), robust)
 
         try:

@@ -9,7 +9,7 @@ import typer
 
 from surehold.amounts import amount
 from surehold.cli import study_people, study_service
-from surehold.cli.options import Allowed, Constraint, Failures, First, Safety, Surrogate
+from surehold.cli.options import Allowed, Constraint, Failures, First, RiskMeasure, Safety, Surrogate
 from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, quiet, say, write_out
 
 __all__ = ["studies"]
@@ -64,7 +64,7 @@ def create(
     initial: Annotated[int | None, typer.Option(help="Trials of the initial design.")] = None,
     surrogate: Surrogate = "",
     criterion: Annotated[str, typer.Option(help="As in surehold.Optimizer.", show_default=False)] = "",
-    risk: Annotated[str, typer.Option(help="mean, mean-std, var, cvar or worst.")] = "mean",
+    risk: RiskMeasure = "",
     observation_noise: Annotated[
         str, typer.Option(help="Of the values: none, inferred, heteroscedastic, or a standard deviation.")
     ] = "none",
@@ -85,7 +85,7 @@ def create(
     as_json: Json = False,
 ) -> None:
     """Create a study."""
-    from surehold.cli.options import limits_given, noise_of
+    from surehold.cli.options import limits_given, noise_of, risk_of
     from surehold.studies.parameter_text import parse_assignments
     from surehold.studies.robot import RobotStudy
     from surehold.studies.settings import StudySettings
@@ -94,7 +94,8 @@ def create(
     optimizer: dict[str, Any] = {"seed": seed}
     optimizer |= {} if initial is None else {"n_initial": initial}
     optimizer |= {} if outcome == "value" else {"outcome": outcome}
-    optimizer |= {} if risk == "mean" else {"risk": risk}
+    asked = risk_of(risk, "ubo")
+    optimizer |= {} if asked is None or asked.name == "mean" else {"risk": asked}
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
     optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
     optimizer |= limits_given(constraint, allowed, feasible, failures, safety, first)

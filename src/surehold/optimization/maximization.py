@@ -167,6 +167,8 @@ class Result:
         rows = [(name, f"{v:.6g}" if isinstance(v, float) else str(v)) for name, v in best.parameters.items()]
         rows += [(name, in_digits(getattr(best, name), best.std, 6)) for name in ("mean", "quantile", "observed")]
         rows.insert(-2, ("std", f"{best.std:.6g}"))
+        if best.by_risk is not None:
+            rows.insert(-3, (f"{self.optimizer.risk}", in_digits(best.by_risk, best.std, 6)))
         cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
         said = (best.refused, best.warning)
         refused = "".join(f"<p>{escape(text)}</p>" for text in said if text)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.samples import Samples
@@ -41,6 +42,11 @@ class RobustProblem(NamedTuple):
     """published budget, initial design included; 0 where none is published"""
     optimum: Optimum | None = None
     """best place and its `value`, where they are known to the digits given"""
+
+    @property
+    def measure(self) -> Risk:
+        """What is asked of the outcome, as an `Optimizer` takes it."""
+        return Risk(self.risk, self.alpha, self.beta)
 
     def value(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what is asked of the outcome at x (n, d), exactly or to about 1e-3 of the spread (risk "var").

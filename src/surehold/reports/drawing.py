@@ -8,7 +8,7 @@ import numpy as np
 
 from surehold.reports.run_report import Candidate, RunReport, Surface
 from surehold.reports.scales import set_scale
-from surehold.reports.verdict import worth
+from surehold.reports.wording import worth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,7 +90,7 @@ def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
     counts, _ = np.histogram(candidate.values, edges)
     axes.bar(edges[:-1], counts, np.diff(edges), align="edge", color=color, alpha=0.75, linewidth=0)
     axes.axvline(candidate.quality, color=PALETTE["ink"], linestyle=(0, (4, 2)), linewidth=1.2)
-    axes.plot(candidate.mean, 0, marker="D", color=color, markeredgecolor=PALETTE["ink"], clip_on=False, zorder=5)
+    axes.plot(candidate.worth, 0, marker="D", color=color, markeredgecolor=PALETTE["ink"], clip_on=False, zorder=5)
     right = candidate.quality > 0.6 * edges[-1] + 0.4 * edges[0]
     axes.annotate(
         "hit exactly",
@@ -104,7 +104,8 @@ def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
     )
     axes.set_xlim(edges[0], edges[-1])
     axes.set_ylim(0.0, 1.18 * tallest)
-    axes.set_xlabel(f"{report.axis_name} (◆ mean {worth(report, candidate.mean)})")
+    measure = report.risk.words(report.minimized)
+    axes.set_xlabel(f"{report.axis_name} (◆ {measure} {worth(report, candidate.worth)})")
     axes.set_ylabel("re-queries")
     axes.xaxis.set_major_locator(MaxNLocator(nbins=5))  # more would overlap where numbers are long
     axes.yaxis.set_major_locator(MaxNLocator(nbins=3, integer=True))
@@ -253,7 +254,7 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             report.robust_trace,
             color=PALETTE["answer"],
             linewidth=1.8,
-            label="recommended: expected under the noise",
+            label=f"recommended: {report.expected_name}",
         )
     if 0 < report.n_initial < report.y.size:
         first = float(k[report.n_initial]) - 0.5  # the first later trial

@@ -88,6 +88,8 @@ def candidate(
         details or {},
         scene,
         minimized=result.optimizer.direction == "minimize",
+        risk=result.optimizer.risk,
+        predicted_worth=None if told is None or score is None else told.by_risk,
     )
 
 
@@ -96,10 +98,16 @@ def expected(result: Result, candidate: Candidate) -> Candidate:
     best = result.recommendation
     if candidate.label == "recommended":
         return replace(
-            candidate, predicted_mean=best.mean, predicted_std=best.std, predicted_error=best.expectation.std
+            candidate,
+            predicted_mean=best.mean,
+            predicted_std=best.std,
+            predicted_error=best.expectation.std,
+            predicted_worth=best.by_risk,
         )
-    mean, std = result.optimizer.predict(candidate.x[None, :], under_noise=True)
-    return replace(candidate, predicted_mean=float(mean[0]), predicted_error=float(std[0]))
+    x = candidate.x[None, :]
+    mean, std = result.optimizer.predict(x, under_noise=True)
+    worth = None if best.by_risk is None else float(result.optimizer.risk_measure(x)[0])
+    return replace(candidate, predicted_mean=float(mean[0]), predicted_error=float(std[0]), predicted_worth=worth)
 
 
 def _of_constraints(result: Result) -> list[str]:
@@ -181,7 +189,7 @@ def report_of(
     averaged = optimizer.input_noise is not None or box.uncontrolled is not None
     for place, trial in enumerate(result.trials[: y.size]):
         if trial.recommendation is not None and averaged:
-            robust[place] = trial.recommendation.mean
+            robust[place] = trial.recommendation.worth
     called = [trial.index for trial in result.trials] if len(result.trials) == y.size else list(range(y.size))
     ids = () if called == list(range(y.size)) else tuple(called)
     missing = ["Trials have the ids of the study; those that are missing have told nothing."] if ids else []
@@ -200,7 +208,7 @@ def report_of(
             )
             for candidate in candidates
         ),
-        settings=settings,
+        settings={**settings, **({} if optimizer.risk.name == "mean" else {"risk": str(optimizer.risk)})},
         seed=optimizer.seed,
         quality_name=quality_name or ("success" if counted else "value"),
         disturbance=disturbance,

@@ -58,6 +58,17 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
                 "What many executions give on average. Its uncertainty is what the model does not know yet; it shrinks "
                 "with further trials.",
             ),
+            *(
+                []
+                if report.risk.name == "mean"
+                else [
+                    (
+                        report.risk.words(report.minimized),
+                        f"What the recommended point should have as {'low' if report.minimized else 'high'} as "
+                        "possible, in place of the mean: that is what was asked for.",
+                    )
+                ]
+            ),
             (
                 "one execution",
                 "What the next execution gives. Its standard deviation holds the input noise, the noise of the "

@@ -39,7 +39,7 @@ def _progress(report: RunReport) -> dict[str, Any]:
         known = np.isfinite(report.robust_trace)
         data.append(
             _curve(
-                number[known], report.robust_trace[known], "recommended, expected under the noise", _ANSWER, shape="hv"
+                number[known], report.robust_trace[known], f"recommended, {report.expected_name}", _ANSWER, shape="hv"
             )
         )
     return _plot(f"{report.extreme.capitalize()} observed and robust value", data, "trial", report.axis_name)

@@ -12,7 +12,8 @@ from surehold.reports.drawing import marked
 from surehold.reports.glossary import glossary
 from surehold.reports.run_report import Candidate, RunReport, Scene, Surface, Variable
 from surehold.reports.scene import scene_data
-from surehold.reports.verdict import change, coordinate, coordinates, halved, number, percent, verdict, worth
+from surehold.reports.verdict import verdict
+from surehold.reports.wording import change, coordinate, coordinates, halved, number, percent, worth
 
 __all__ = ["TEMPLATES", "environment", "render", "scene_context", "table_rows"]
 
@@ -151,8 +152,8 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         what = f"the {candidate.label} point" if report.succeeded else report.called(candidate)
         name = f"shake-{label['role']}"
         text = (
-            f"Histogram of {candidate.values.size} re-queries of {what}: mean "
-            f"{worth(report, candidate.mean)}, worst {worth(report, candidate.worst)}"
+            f"Histogram of {candidate.values.size} re-queries of {what}: {report.risk.words(report.minimized)} "
+            f"{worth(report, candidate.worth)}, worst {worth(report, candidate.worst)}"
         )
         svg = Markup(figures.inline_svg(drawings[figures.shake_name(candidate)], name, text))
     return {
@@ -163,13 +164,13 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         "where": coordinates(report, candidate),
         "quality": percent(candidate.predicted_mean) if report.counted else worth(report, candidate.quality),
         "quality_is": "of executions are expected to succeed" if report.counted else "hit exactly",
-        "mean": "" if not shaken else percent(candidate.mean) if report.counted else worth(report, candidate.mean),
-        "mean_is": f"of {candidate.values.size} re-queries succeeded" if report.counted else "on average",
+        "mean": "" if not shaken else percent(candidate.mean) if report.counted else worth(report, candidate.worth),
+        "mean_is": f"of {candidate.values.size} re-queries succeeded" if report.counted else report.manner,
         "worst": worth(report, candidate.worst),
         "std": number(candidate.std, 2),
         "n": candidate.values.size,
         "halved": halved(candidate),
-        "change": change(candidate) if shaken and not report.counted else "",
+        "change": change(candidate) if shaken and not report.counted and report.risk.name == "mean" else "",
         "svg": svg,
     }
 
@@ -254,6 +255,8 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
     if any(c.values.size for c in every) and not report.counted:
         n = max(c.values.size + c.n_failed for c in every)
         rows.append(row(f"mean of {n} perturbed re-queries", lambda c: worth(report, c.mean, 4)))
+        if report.risk.name not in ("mean", "worst"):
+            rows.append(row(f"{report.risk.words(report.minimized)} of them", lambda c: worth(report, c.worth, 4)))
         rows.append(row("95 % of them are better than", lambda c: worth(report, c.bad, 4)))
         rows.append(row("worst of them", lambda c: worth(report, c.worst, 4)))
         rows.append(row("standard deviation", lambda c: number(c.std, 3)))
@@ -264,6 +267,9 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
         rows.append(row(f"model: {what} ± its uncertainty", lambda c: _expected(report, c, c.predicted_error)))
     if any(c.predicted_mean is not None for c in every) and not report.counted:
         rows.append(row("model: one execution ± standard deviation", lambda c: _expected(report, c, c.predicted_std)))
+    if any(c.predicted_worth is not None for c in every):
+        measure = f"model: {report.risk.words(report.minimized)}"
+        rows.append(row(measure, lambda c: worth(report, c.predicted_worth, 4)))
     names = dict.fromkeys(name for c in every for name in c.details)
     rows.extend(row(name, lambda c, name=name: c.details.get(name, "–")) for name in names)
     return rows

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.optimization.acquisition.risk_measures import Risk
 
 __all__ = [
     "Candidate",
     "ContactSet",
+    "Floats",
     "Neighbors",
     "ObjectBox",
     "RunReport",
@@ -148,6 +150,13 @@ class Candidate:
     scene: Scene | None = None
     noise: Floats | None = None  #: (d, d) covariance of the input noise at x, in the units of the box
     minimized: bool = False  #: whether lower values are better
+    risk: Risk = field(default_factory=Risk)  #: what the run was asked to maximize of the outcome
+    predicted_worth: float | None = None  #: what the model expects the point to be worth by it, if it is not the mean
+
+    @property
+    def worth(self) -> float:
+        """What the re-queries are worth by the risk measure that was asked for, by default their mean; or NaN."""
+        return self.risk.of_executions(self.values, self.minimized)
 
     @property
     def mean(self) -> float:
@@ -245,6 +254,24 @@ class RunReport:
     def noise(self) -> Floats | None:
         """(d, d) covariance of the input noise at the recommended point, in the units of the box."""
         return self.recommended.noise
+
+    @property
+    def risk(self) -> Risk:
+        """What the run was asked to maximize of the outcome under the noise."""
+        return self.recommended.risk
+
+    @property
+    def manner(self) -> str:
+        """By what points are compared, in words: "on average", "by the mean of the worst 10 %"."""
+        named = {"mean": "on average", "worst": "at worst"}
+        return named.get(self.risk.name, f"by the {self.risk.words(self.minimized)}")
+
+    @property
+    def expected_name(self) -> str:
+        """What `robust_trace` is, in words."""
+        if self.risk.name == "mean":
+            return "expected under the noise"
+        return f"expected {self.risk.words(self.minimized)}"
 
     @property
     def axis_name(self) -> str:

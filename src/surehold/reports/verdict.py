@@ -9,11 +9,13 @@ from typing import Final
 import numpy as np
 
 from surehold.amounts import amount
-from surehold.reports.run_report import Candidate, RunReport, Variable
+from surehold.reports.run_report import Candidate, Floats, RunReport
+from surehold.reports.wording import change, coordinates, halved, number, percent, worth
 
+_RESAMPLES: Final = 200
 _NOTABLE: Final = 0.1  # share of the range of the values met from which on bad cases count as different
 
-__all__ = ["Verdict", "change", "coordinate", "coordinates", "halved", "number", "percent", "verdict", "worth"]
+__all__ = ["Verdict", "verdict"]
 
 
 @dataclass(frozen=True)
@@ -25,49 +27,8 @@ class Verdict:
     refused: bool  #: whether the highest trial was refused for a lower one, and the re-queries bear it out
 
 
-def number(value: float | None, digits: int = 3) -> str:
-    """Return a value as people write it: `digits` significant digits, no exponent between 0.0001 and 100,000.
-
-    Nor beyond, where so many digits reach behind the point.
-    """
-    if value is None or not math.isfinite(value):
-        return "–"
-    if value == 0.0:
-        return "0"
-    size = math.floor(math.log10(abs(value)))
-    if size < -4 or size >= max(5, digits):
-        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa}e{int(exponent)}".replace("-", "−")
-    return f"{value:.{max(digits - 1 - size, 0)}f}".replace("-", "−")
-
-
-def worth(report: RunReport, value: float | None, digits: int = 3) -> str:
-    """Return a value of the run as people write it, with as many digits as tell the run's values apart."""
-    return number(value, digits + report.more_digits)
-
-
 def _said(report: RunReport) -> Callable[[float | None], str]:
     return partial(worth, report)
-
-
-def coordinate(variable: Variable, value: float, digits: int = 3) -> str:
-    """Return a value of a variable as people write it, without its unit."""
-    plain = float(variable.shown(np.float64(value)))  # type: ignore[arg-type]
-    if variable.whole and abs(plain - round(plain)) < 1e-6 * max(abs(plain), 1.0) < 1e9:
-        return f"{round(plain)}".replace("-", "−")
-    return number(plain, digits + variable.more_digits)
-
-
-def coordinates(report: RunReport, candidate: Candidate) -> str:
-    """Return where a candidate is, as `dx = 3.1 mm, rx = 12°`."""
-    parts = []
-    for variable, value in zip(report.variables, candidate.x, strict=True):
-        unit = variable.shown_unit
-        space = "" if unit in ("", "°") else " "
-        parts.append(f"{variable.name} = {coordinate(variable, value)}{space}{unit}{' (drawn)' * variable.drawn}")
-    if candidate.trial is not None:
-        parts += [f"{name} = {texts[candidate.trial]}" for name, texts in report.choices.items()]
-    return ", ".join(parts)
 
 
 def verdict(report: RunReport) -> Verdict:
@@ -119,50 +80,55 @@ def _of_the_run(report: RunReport) -> Verdict:
             False,
         )
     gap, error = _difference(report)
+    by, plain = report.manner, report.risk.name == "mean"
     text = (
         f"{_sentence(report, highest, f'The {extreme} point')} {_sentence(report, answer, 'The recommended point')} "
-        f"The means differ by {number(abs(gap))} (standard error {number(error, 2)}, both points shaken alike)."
+        f"{'The means' if plain else f'{by[0].upper()}{by[1:]} they'} differ by {number(abs(gap))} (standard error "
+        f"{number(error, 2)}, both points shaken alike)."
     )
+    tied = abs(gap) <= 2.0 * error or said(highest.worth) == said(answer.worth)
     lost, kept = halved(highest), halved(answer)
-    if abs(gap) <= 2.0 * error and lost - kept > 2.0 * math.sqrt(lost + kept):
+    if tied and lost - kept > 2.0 * math.sqrt(lost + kept):
         headline = (
             f"The {peak} ({said(highest.quality)}) was refused: when {off} it loses more than half in "
             f"{lost} of {highest.values.size} cases, the recommended point in {kept or 'none'}."
         )
         return Verdict(headline, text, True)
     tail = _tail(report)
-    means, worsts = (f"{said(highest.mean)} and {said(answer.mean)}", f"{said(highest.worst)} at worst")
-    if abs(gap) <= 2.0 * error and tail > 0:
+    means, worsts = (f"{said(highest.worth)} and {said(answer.worth)}", f"{said(highest.worst)} at worst")
+    if tied and tail > 0:
         headline = (
             f"The {peak} ({said(highest.quality)}) was refused: when {off} it {falls} to {worsts}, the "
-            f"recommended point to {said(answer.worst)}; on average they are worth about the same, {means}."
+            f"recommended point to {said(answer.worst)}; {by} they are worth about the same, {means}."
         )
         return Verdict(headline, text, True)
-    if abs(gap) <= 2.0 * error and tail < 0:
+    if tied and tail < 0:
         headline = (
-            f"When {off}, the {extreme} trial and the recommended one are worth about the same on average ({means}), "
+            f"When {off}, the {extreme} trial and the recommended one are worth about the same {by} ({means}), "
             f"but the recommended one {falls} to {said(answer.worst)} at worst, the other to {said(highest.worst)}."
         )
         return Verdict(headline, text, False)
-    if abs(gap) <= 2.0 * error:
+    if tied:
+        and_at_worst = f", {said(highest.worst)} and {said(answer.worst)} at worst" * (report.risk.name != "worst")
         headline = (
-            f"When {off}, the {extreme} trial and the recommended one are worth about the same: {means} on average, "
-            f"{said(highest.worst)} and {said(answer.worst)} at worst."
+            f"When {off}, the {extreme} trial and the recommended one are worth about the same: {means} {by}"
+            f"{and_at_worst}."
         )
         return Verdict(headline, text, False)
+    measured = "" if plain else f" {by}"
     if gap > 0.0:
         deeper = _better(report, highest.worst, answer.worst) > _notable(report)
         yet = f", but {falls} to {said(answer.worst)} at worst (the other to {said(highest.worst)})" * deeper
         at = "as high as" if report.minimized else "worth only"
         headline = (
-            f"The {peak} ({said(highest.quality)}) was refused: when {off} it is {at} {said(highest.mean)}, the "
-            f"recommended point {said(answer.mean)}{yet}."
+            f"The {peak} ({said(highest.quality)}) was refused: when {off} it is {at} {said(highest.worth)}{measured}, "
+            f"the recommended point {said(answer.worth)}{yet}."
         )
         return Verdict(headline, text, True)
     holds = f", although it {falls} only to {said(answer.worst)} at worst (the other to {said(highest.worst)})"
     headline = (
         f"The model preferred another point, but the re-queries do not bear it out: when {off} it is worth "
-        f"{said(answer.mean)}, the {peak} {said(highest.mean)}{holds * (tail > 0)}."
+        f"{said(answer.worth)}{measured}, the {peak} {said(highest.worth)}{holds * (tail > 0)}."
     )
     text += " More trials near both points would let the model see this."
     return Verdict(headline, text, False)
@@ -207,11 +173,6 @@ def _of_successes(report: RunReport) -> Verdict:
     )
 
 
-def percent(share: float | None) -> str:
-    """Return a share in percent."""
-    return "–" if share is None or not math.isfinite(share) else f"{100.0 * share:.3g} %"
-
-
 def _notable(report: RunReport) -> float:
     """Return from which difference on bad cases count as different, in the units of the values."""
     told = report.y[~report.failed]
@@ -238,20 +199,26 @@ def _of_the_model(report: RunReport) -> Verdict:
     """Return the verdict where nothing was queried again: what the model expects."""
     highest, answer, off, said = report.observed, report.recommended, report.disturbance, _said(report)
     peak = f"{report.extreme} {'dip' if report.minimized else 'peak'}"
-    expected = said(answer.predicted_mean)
+    expected = said(_expected(answer))
+    measured = "" if report.risk.name == "mean" else f" {report.manner}"
     text = f"No re-queries with perturbed inputs were made: what happens when {off} is what the model expects."
     if len(report.candidates) == 1:
         headline = (
             f"The {report.extreme} trial is also the recommended one: {said(answer.quality)} when hit exactly; when "
-            f"{off}, the model expects {expected}."
+            f"{off}, the model expects {expected}{measured}."
         )
         return Verdict(headline, text, False)
     headline = (
         f"The {peak} ({said(highest.quality)}) is not recommended: when {off}, the model expects "
-        f"{said(highest.predicted_mean)} of it, and {expected} of the recommended point."
+        f"{said(_expected(highest))} of it{measured}, and {expected} of the recommended point."
     )
     where = f"Recommended is {coordinates(report, answer)} ({_trial_of(report, answer)}). {text}"
     return Verdict(headline, where, True)
+
+
+def _expected(candidate: Candidate) -> float | None:
+    """Return what the model expects a candidate to be worth by what was asked for."""
+    return candidate.predicted_mean if candidate.predicted_worth is None else candidate.predicted_worth
 
 
 def _sentence(report: RunReport, candidate: Candidate, subject: str) -> str:
@@ -261,29 +228,13 @@ def _sentence(report: RunReport, candidate: Candidate, subject: str) -> str:
         f"hit exactly. Queried again {n} times with perturbed inputs it gave {said(candidate.mean)} on average "
         f"({_change(candidate)}), {said(candidate.worst)} at worst."
     )
+    if report.risk.name not in ("mean", "worst"):
+        text += f" The {report.risk.words(report.minimized)} of them is {said(candidate.worth)}."
     if halved(candidate):
         text += f" In {halved(candidate)} of {n} it lost more than half."
     if candidate.n_failed:
         text += f" {candidate.n_failed} further re-queries gave no value."
     return text
-
-
-def halved(candidate: Candidate) -> int:
-    """Return in how many re-queries the point lost more than half of its exact value; 0 where that says nothing.
-
-    Where values are minimized a lower one is no loss.
-    """
-    if candidate.minimized or not candidate.quality > 0.0:
-        return 0
-    return int(np.sum(candidate.values < 0.5 * candidate.quality))
-
-
-def change(candidate: Candidate) -> str:
-    """Return by how many percent the re-queries' mean differs from the exact value; empty where that says nothing."""
-    if not candidate.quality > 0.0 or not math.isfinite(candidate.mean):
-        return ""
-    share = 100.0 * (candidate.mean / candidate.quality - 1.0)
-    return "unchanged" if abs(share) < 0.5 else f"{share:+.0f}\u00a0%".replace("-", "−")
 
 
 def _change(candidate: Candidate) -> str:
@@ -296,13 +247,29 @@ def _better(report: RunReport, one: float, other: float) -> float:
 
 
 def _difference(report: RunReport) -> tuple[float, float]:
-    """Return by how much the answer's mean is better, and the standard error: paired where both were shaken alike."""
+    """Return by how much the answer is better, and the standard error: paired where both were shaken alike.
+
+    By the mean of the re-queries, or by the risk measure that was asked for; of that by a bootstrap (Efron 1979).
+    """
     highest, answer = report.observed, report.recommended
-    gap = _better(report, answer.mean, highest.mean)
+    gap = _better(report, answer.worth, highest.worth)
     a, h = answer.values, highest.values
+    if report.risk.name != "mean":
+        return gap, _bootstrapped(report, a, h, answer.n_failed == highest.n_failed == 0)
     if a.size == h.size and a.size > 1 and answer.n_failed == highest.n_failed == 0:
         return gap, float(np.std(a - h, ddof=1)) / math.sqrt(a.size)
     return gap, math.hypot(answer.std / math.sqrt(a.size), highest.std / math.sqrt(h.size))
+
+
+def _bootstrapped(report: RunReport, a: Floats, h: Floats, alike: bool) -> float:
+    """Return the standard error of the difference of two risk measures of re-queries (q,), those of `alike` paired."""
+    rng, gaps = np.random.default_rng(0), []
+    for _ in range(_RESAMPLES):
+        first = rng.integers(a.size, size=a.size)
+        second = first if alike and a.size == h.size else rng.integers(h.size, size=h.size)
+        one, other = (report.risk.of_executions(v, report.minimized) for v in (a[first], h[second]))
+        gaps.append(one - other)
+    return float(np.std(gaps, ddof=1))
 
 
 def _trial(report: RunReport, candidate: Candidate) -> str:

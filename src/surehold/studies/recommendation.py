@@ -59,6 +59,10 @@ class StudyRecommendation:
     """what is expected of the further outputs, by name"""
     sure: dict[str, float] = field(default_factory=dict)
     """where trials succeed or fail: how sure the model is that at least this share of executions succeed, by share"""
+    by_risk: float | None = None
+    """what they are expected to be worth by the risk measure that was asked for; None where that is the mean"""
+    risk: str = "mean"
+    """that measure, in words"""
 
     @property
     def expected(self) -> str:
@@ -69,7 +73,13 @@ class StudyRecommendation:
             )
             return f"{self.mean:.1%} of executions succeed; 95% sure of at least {self.quantile:.1%}, {more}"
         mean, quantile = in_digits(self.mean, self.std), in_digits(self.quantile, self.std)
-        return f"{mean} ± {self.std:.2g}, 95 % better than {quantile}"
+        measured = "" if self.by_risk is None else f", {self.risk} {in_digits(self.by_risk, self.std)}"
+        return f"{mean} ± {self.std:.2g}, 95 % better than {quantile}{measured}"
+
+    @property
+    def worth(self) -> float:
+        """What they are expected to be worth by what was asked for: `by_risk`, or the mean."""
+        return self.mean if self.by_risk is None else self.by_risk
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -118,7 +128,7 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
     space = sampler.search_space(study)
     history = sampler.history(trials, space)
     with sampler.optimizing(space, history, direction) as optimizer:
-        best, success = optimizer.recommend(), optimizer.outcome == "success"
+        best, success, risk = optimizer.recommend(), optimizer.outcome == "success", optimizer.risk
         y = optimizer.y  # where trials succeed or fail, a failed one is one that did not succeed
         told = np.flatnonzero(np.isfinite(y))
         distance = np.abs(optimizer.box.to_unit(history.reached[told]) - optimizer.box.to_unit(best.x)).max(axis=1)
@@ -145,6 +155,8 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         best.infeasible,
         {name: outcome.mean for name, outcome in best.outputs.items()},
         {f"{share:g}": best.probability_of_share(share) for share in _SHARES} if success else {},
+        best.by_risk,
+        risk.words(direction == "minimize"),
     )
 
 
