@@ -162,6 +162,8 @@ def test_a_published_problem_is_run_under_its_own_risk_measure(here, capsys):
     assert "asked for is the mean less 0.5 variances" in " ".join(capsys.readouterr().out.split())
     assert surehold("maximize qing-branin --trials 6 --initial 5 --out out --requeries 10 --risk mean") == 0
     assert "asked for" not in capsys.readouterr().out
+    assert surehold("maximize rahbo-sine-1 --noise 0.03 --trials 6 --initial 5 --out out --requeries 0") == 0
+    assert "asked for" not in capsys.readouterr().out, "its measure is of noisy observations, not of noisy inputs"
 
 
 def test_trials_that_raise_are_failures_and_the_run_goes_on(here, capsys):

@@ -169,10 +169,11 @@ def own_noise(problem: str) -> Any:
 
 
 def own_risk(problem: str) -> Any:
-    """Return the risk measure under which a robust problem's best place is sought; None for other problems."""
+    """Return the measure of the outcome under input noise that a robust problem states; None where it states none."""
     from surehold.problems.named import has_own_noise, robust_problem
 
-    return robust_problem(problem).measure if has_own_noise(problem) else None
+    robust = robust_problem(problem) if has_own_noise(problem) else None
+    return None if robust is None or robust.noise is None else robust.measure
 
 
 def problem_of(text: str, bounds: str) -> Any:
