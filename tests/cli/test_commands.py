@@ -74,6 +74,10 @@ def here(tmp_path, monkeypatch):
         ("maximize rkhs --risk cvarr", "did you mean 'cvar'"),
         ("maximize rkhs --risk cvar=2", "strictly between 0 and 1"),
         ("maximize rkhs --risk cvar --method bo", "which method 'bo' does not know"),
+        ("maximize rkhs --risk cvar --preset thesis", "leave one out"),
+        ("maximize own.py:hill --bounds a=0:1 --risk cvar --outcome success", "--risk cvar is of values"),
+        ("grasp mug --risk cvarr", "did you mean 'cvar'"),
+        ("grasp mug --risk cvar --outcome held", "--risk cvar is of values"),
         ("maximize gm --noise x1=0.1", "says nothing about x2"),
         ("maximize gm --noise x1=0.1,y=0.1", "'y' is unknown"),
         ("maximize gm --bounds a=0:1", "has its own bounds"),
@@ -161,6 +165,8 @@ def test_a_published_problem_is_run_under_its_own_risk_measure(here, capsys):
     assert surehold("maximize qing-branin --trials 6 --initial 5 --out out --requeries 10") == 0
     assert "asked for is the mean less 0.5 variances" in " ".join(capsys.readouterr().out.split())
     assert surehold("maximize qing-branin --trials 6 --initial 5 --out out --requeries 10 --risk mean") == 0
+    assert "asked for" not in capsys.readouterr().out
+    assert surehold("maximize qing-branin --trials 6 --initial 5 --out out --requeries 0 --preset thesis") == 0
     assert "asked for" not in capsys.readouterr().out
     assert surehold("maximize rahbo-sine-1 --noise 0.03 --trials 6 --initial 5 --out out --requeries 0") == 0
     assert "asked for" not in capsys.readouterr().out, "its measure is of noisy observations, not of noisy inputs"

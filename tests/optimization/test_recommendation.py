@@ -143,6 +143,18 @@ def test_what_the_answer_is_worth_by_the_measure_is_stated_with_it(direction, si
     assert plain.risk_measure([[0.0]])[0] == pytest.approx(plain.predict([[0.0]], under_noise=True)[0][0])
 
 
+@pytest.mark.parametrize("direction", ["maximize", "minimize"])
+@pytest.mark.parametrize("noise", [None, "inferred"])
+def test_of_an_unsure_model_the_mean_less_nothing_is_the_mean(direction, noise):
+    rng, box = np.random.default_rng(2), sh.Box({"a": (0.0, 1.0), "b": (0.0, 1.0)})
+    strays, risk = sh.InputNoise.unit(0.05), sh.Risk("mean-std", beta=0.0)
+    optimizer = sh.Optimizer(box, input_noise=strays, risk=risk, direction=direction, noise=noise, seed=0)
+    optimizer.restore(rng.random((12, 2)), rng.standard_normal(12))
+    best = optimizer.recommend()
+    assert best.expectation.std > 0.01
+    assert best.by_risk == pytest.approx(best.mean, abs=1e-9)
+
+
 def test_the_stated_mean_is_as_sure_as_its_average():
     """Of a sine under normal noise the mean is known; the model is sure of it to more digits than 128 points are."""
     noise = 0.04

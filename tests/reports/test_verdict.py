@@ -184,10 +184,41 @@ def test_the_standard_error_of_a_measure_is_that_of_normal_samples(paired):
     risk = Risk("mean-std", beta=2.0)
     pair = shaken("highest observed", 5.0, one), shaken("recommended", 3.0, 1.0 + other)
     if not paired:
-        pair = pair[0], replace(pair[1], n_failed=3)
+        pair = pair[0], replace(pair[1], n_failed=1, lost=1.0)
     told = verdict(report(*(averse(candidate, risk) for candidate in pair)))
     error = float(re.search(r"standard error ([\d.]+)", told.text)[1])
     assert error == pytest.approx(np.sqrt(2.0 * (1.0 / n + 4.0 / (2.0 * n))), rel=0.15)
+
+
+def test_the_worst_case_is_judged_by_the_lowest_re_query_alone():
+    bad = [np.append(np.linspace(0.8, 0.9, 99), low) for low in (-1.0, 0.5)]
+    pair = shaken("highest observed", 1.0, bad[0]), shaken("recommended", 0.9, bad[1])
+    told = verdict(report(*(averse(candidate, Risk("worst")) for candidate in pair)))
+    assert told.headline == (
+        "The highest peak (1.00) was refused: when the input is off it is worth only −1.00 at worst, the recommended "
+        "point 0.500."
+    )
+    assert "At worst they differ by 1.50 (both points shaken alike)." in told.text
+
+
+def test_the_headline_of_a_single_point_states_the_measure():
+    alone = averse(shaken("recommended", 3.0, 2.0 + SPREAD), Risk("cvar", alpha=0.2))
+    worst = number(np.sort(2.0 + SPREAD)[:10].mean())
+    assert (
+        f"2.00 on average, {worst} by the mean of the worst 20 % and 1.00 at worst" in verdict(report(alone)).headline
+    )
+
+
+@pytest.mark.parametrize("name", ["worst", "cvar", "var"])
+def test_a_re_query_without_a_value_is_no_merit(name):
+    sound = averse(shaken("highest observed", 1.0, np.linspace(0.8, 0.9, 100)), Risk(name))
+    lucky = averse(shaken("recommended", 0.96, np.full(20, 0.95)), Risk(name))
+    lost = replace(lucky, n_failed=80, lost=-3.0)
+    assert verdict(report(sound, lucky)).refused == (name != "worst")  # by .15 of a range of 2 it is a tie
+    assert lost.worth == pytest.approx(-3.0)
+    told = verdict(report(sound, lost))
+    assert not told.refused
+    assert "do not bear it out" in told.headline
 
 
 def test_points_that_are_worth_the_same_are_said_to_be_whatever_the_error():

@@ -404,6 +404,18 @@ def test_settings_survive_the_storage(tmp_path):
     assert robot.ask().parameters == RobotStudy.open("all", robot.storage.url).trials()[0].params
 
 
+def test_a_measure_by_its_name_is_the_one_with_its_usual_parameter():
+    space, noise = SearchSpace({"x": FloatDistribution(0.0, 1.0)}), sh.InputNoise({"x": 0.1})
+    named, written, plain = (
+        StudySettings(space, noise, {}, optimizer)
+        for optimizer in ({"risk": "cvar"}, {"risk": sh.Risk("cvar", alpha=0.1)}, {})
+    )
+    assert named.differences(written) == written.differences(named) == []
+    assert plain.differences(named) == ["risk: mean in the study, cvar=0.1 now"]
+    stored = named.to_json()
+    assert StudySettings.from_json(stored | {"optimizer": {"risk": "cvar"}}).differences(named) == []
+
+
 def test_a_correlated_noise_survives_the_storage(tmp_path):
     covariance = np.array([[9e-6, 2e-6], [2e-6, 4e-6]])
     settings = StudySettings(SearchSpace(BOX), sh.InputNoise(covariance=covariance))

@@ -121,6 +121,7 @@ def grasp(
     if outcome == "held" and study:
         raise InputError(f"--outcome held is for runs that are not kept; leave --study {study} out.")
     input_noise = noise_of(noise or "none", method)
+    asked = risk_of(risk, method, preset, outcome)
 
     from surehold.cli.compilation import announced
     from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
@@ -208,7 +209,7 @@ def grasp(
         quality_name="held (physics)" if outcome == "held" else quality_name(problem),
         outcome="success" if outcome == "held" else "value",
         disturbance="the hand is off",
-        risk=risk_of(risk, method),
+        risk=asked,
         success_above=0.0,
         outcomes=statuses,
         advice=advice_for(problem),

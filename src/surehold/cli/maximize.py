@@ -101,7 +101,9 @@ def maximize(
     defaults = defaults_of(problem)
     noise_text = defaults.noise if noise is None else noise
     input_noise = own_noise(problem) if noise_text == "own" else noise_of(noise_text, method)
-    asked = risk_of(risk, method) or (own_risk(problem) if method == "ubo" else None)
+    asked = risk_of(risk, method, preset, outcome)
+    if asked is None and method == "ubo" and not preset and outcome == "value":
+        asked = own_risk(problem)
 
     from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
     from surehold.optimization.optimizer import Optimizer

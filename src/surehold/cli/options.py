@@ -154,20 +154,29 @@ def noise_of(text: str, method: str) -> InputNoise | None:
     return InputNoise(deviations)
 
 
-def risk_of(text: str, method: str) -> Any:
+def risk_of(text: str, method: str, preset: str = "", outcome: str = "value") -> Any:
     """Return the `Risk` that `--risk` describes, None where nothing is said.
 
-    Raises InputError for an unknown measure, a wrong parameter, and with a method that knows no noise.
+    Raises InputError for an unknown measure, a wrong parameter, and beside what has no use for one: a method that knows
+    no noise, a preset of the thesis, outcomes that are no values.
     """
     from surehold.optimization.acquisition.risk_measures import Risk
 
     if not text:
         return None
     risk = Risk.parse(text)
-    if method == "bo" and risk.name != "mean":
+    if risk.name == "mean":
+        return risk
+    if method == "bo":
         raise InputError(
             f"--risk {text} is of the outcome under input noise, which method 'bo' does not know; use ubo."
         )
+    if preset:
+        raise InputError(
+            f"--risk {text}: --preset {preset} chooses trials as the thesis does, by the mean; leave one out."
+        )
+    if outcome not in ("value", "quality"):
+        raise InputError(f"--risk {text} is of values; with --outcome {outcome} the probability is what counts.")
     return risk
 
 

@@ -94,7 +94,7 @@ def create(
     optimizer: dict[str, Any] = {"seed": seed}
     optimizer |= {} if initial is None else {"n_initial": initial}
     optimizer |= {} if outcome == "value" else {"outcome": outcome}
-    asked = risk_of(risk, "ubo")
+    asked = risk_of(risk, "ubo", preset, outcome)
     optimizer |= {} if asked is None or asked.name == "mean" else {"risk": asked}
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
     optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}

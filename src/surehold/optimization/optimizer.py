@@ -362,11 +362,11 @@ class Optimizer(Record):
     def risk_measure(self, X: ArrayLike) -> NDArray[np.float64]:
         """Return what X (q, d), in the box's units, is expected to be worth by the `risk` that was asked for, (q,).
 
-        Under the input noise; by default its mean. Raises InputError if no trial has given a value yet.
+        Under the input noise; by default its mean, as of `predict`. Raises InputError if no trial has given a value.
         """
         U = np.atleast_2d(self.box.to_unit(X))
         with computing():
-            return self._sign * self._ranking.measure(self.posterior, U)
+            return self._sign * self._ranking.worth(self.posterior, U)
 
     def preferred(self, x: Any, other: Any) -> float:
         """Return the probability that one judgement prefers x to `other`, both (d,) in the box's units.

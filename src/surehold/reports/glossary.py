@@ -65,7 +65,9 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
                     (
                         report.risk.words(report.minimized),
                         f"What the recommended point should have as {'low' if report.minimized else 'high'} as "
-                        "possible, in place of the mean: that is what was asked for.",
+                        "possible, in place of the mean: that is what was asked for."
+                        + " A re-query without a value counts as the worst value of the run."
+                        * any(candidate.n_failed for candidate in report.candidates),
                     )
                 ]
             ),

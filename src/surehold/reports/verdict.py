@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 
 from surehold.amounts import amount
-from surehold.reports.run_report import Candidate, Floats, RunReport
+from surehold.reports.run_report import Candidate, RunReport
 from surehold.reports.wording import change, coordinates, halved, number, percent, worth
 
-_RESAMPLES: Final = 200
+_RESAMPLES: Final = 1000
 _NOTABLE: Final = 0.1  # share of the range of the values met from which on bad cases count as different
 
 __all__ = ["Verdict", "verdict"]
@@ -73,9 +73,10 @@ def _of_the_run(report: RunReport) -> Verdict:
             why = f"The method looks for the {extreme} value and does not ask what happens when {off}."
         else:
             why = "The model expects no other trial to hold better."
+        measured = "" if report.risk.name in ("mean", "worst") else f", {said(answer.worth)} {report.manner}"
         return Verdict(
             f"The {extreme} trial is also the recommended one: {said(answer.quality)} when hit exactly, "
-            f"{said(answer.mean)} on average and {said(answer.worst)} at worst when {off}.",
+            f"{said(answer.mean)} on average{measured} and {said(answer.worst)} at worst when {off}.",
             f"{_sentence(report, answer, 'The recommended point')} {why}",
             False,
         )
@@ -83,8 +84,8 @@ def _of_the_run(report: RunReport) -> Verdict:
     by, plain = report.manner, report.risk.name == "mean"
     text = (
         f"{_sentence(report, highest, f'The {extreme} point')} {_sentence(report, answer, 'The recommended point')} "
-        f"{'The means' if plain else f'{by[0].upper()}{by[1:]} they'} differ by {number(abs(gap))} (standard error "
-        f"{number(error, 2)}, both points shaken alike)."
+        f"{'The means' if plain else f'{by[0].upper()}{by[1:]} they'} differ by {number(abs(gap))} "
+        f"({f'standard error {number(error, 2)}, ' * (report.risk.name != 'worst')}both points shaken alike)."
     )
     tied = abs(gap) <= 2.0 * error or said(highest.worth) == said(answer.worth)
     lost, kept = halved(highest), halved(answer)
@@ -94,7 +95,7 @@ def _of_the_run(report: RunReport) -> Verdict:
             f"{lost} of {highest.values.size} cases, the recommended point in {kept or 'none'}."
         )
         return Verdict(headline, text, True)
-    tail = _tail(report)
+    tail = 0 if report.risk.name == "worst" else _tail(report)
     means, worsts = (f"{said(highest.worth)} and {said(answer.worth)}", f"{said(highest.worst)} at worst")
     if tied and tail > 0:
         headline = (
@@ -249,26 +250,30 @@ def _better(report: RunReport, one: float, other: float) -> float:
 def _difference(report: RunReport) -> tuple[float, float]:
     """Return by how much the answer is better, and the standard error: paired where both were shaken alike.
 
-    By the mean of the re-queries, or by the risk measure that was asked for; of that by a bootstrap (Efron 1979).
+    By the mean of the re-queries, or by the risk measure that was asked for; of that by a bootstrap (Efron 1979). Of
+    the lowest re-query there is none: half of what counts as a notable difference.
     """
     highest, answer = report.observed, report.recommended
     gap = _better(report, answer.worth, highest.worth)
     a, h = answer.values, highest.values
+    if report.risk.name == "worst":
+        return gap, 0.5 * _notable(report)
     if report.risk.name != "mean":
-        return gap, _bootstrapped(report, a, h, answer.n_failed == highest.n_failed == 0)
+        return gap, _bootstrapped(highest, answer)
     if a.size == h.size and a.size > 1 and answer.n_failed == highest.n_failed == 0:
         return gap, float(np.std(a - h, ddof=1)) / math.sqrt(a.size)
     return gap, math.hypot(answer.std / math.sqrt(a.size), highest.std / math.sqrt(h.size))
 
 
-def _bootstrapped(report: RunReport, a: Floats, h: Floats, alike: bool) -> float:
-    """Return the standard error of the difference of two risk measures of re-queries (q,), those of `alike` paired."""
+def _bootstrapped(one: Candidate, other: Candidate) -> float:
+    """Return the standard error of the difference of two risk measures of re-queries, paired where shaken alike."""
     rng, gaps = np.random.default_rng(0), []
+    alike = one.values.size == other.values.size and one.n_failed == other.n_failed == 0
     for _ in range(_RESAMPLES):
-        first = rng.integers(a.size, size=a.size)
-        second = first if alike and a.size == h.size else rng.integers(h.size, size=h.size)
-        one, other = (report.risk.of_executions(v, report.minimized) for v in (a[first], h[second]))
-        gaps.append(one - other)
+        first = rng.integers(one.values.size, size=one.values.size)
+        second = first if alike else rng.integers(other.values.size, size=other.values.size)
+        resampled = (replace(c, values=c.values[again]).worth for c, again in ((one, first), (other, second)))
+        gaps.append(next(resampled) - next(resampled))
     return float(np.std(gaps, ddof=1))
 
 

@@ -48,6 +48,8 @@ class StudySettings:
         if self.direction == "minimize" and self.optimizer.get("outcome", "value") != "value":
             raise InputError("direction='minimize' is of values; where trials succeed or fail, success is maximized.")
         object.__setattr__(self, "problem", _found_from_anywhere(self.problem))
+        if isinstance(self.optimizer.get("risk"), str):  # a name, which is a measure with its usual parameter
+            object.__setattr__(self, "optimizer", {**self.optimizer, "risk": Risk(self.optimizer["risk"])})
         _noise_to_json(self.input_noise, self.space)
         for name in self.units:
             if name not in self.space.distributions:
@@ -120,6 +122,8 @@ class StudySettings:
                 if part == "problem" and isinstance(ours, dict) and isinstance(asked, dict):
                     differing = [k for k in ours | asked if ours.get(k) != asked.get(k)]
                     ours, asked = ({k: side.get(k) for k in differing} for side in (ours, asked))
+                if key == "risk":
+                    ours, asked = (str(side.optimizer.get(key, Risk())) for side in (self, other))
                 if ours != asked:
                     found.append(f"{name} {key}: {_short(ours)} in the study, {_short(asked)} now".strip())
         names, asked = (list(side["parameters"]) for side in (mine, theirs))

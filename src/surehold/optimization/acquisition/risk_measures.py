@@ -70,11 +70,14 @@ class Risk:
             number = float(value)
         except ValueError:
             raise InputError(f"risk {text!r}: {value!r} is not a number; write for example {name}=0.2.") from None
-        return cls(name, **{parameter: number})
+        try:
+            return cls(name, **{parameter: number})
+        except InputError as error:
+            raise InputError(f"risk {text!r}: {error}") from None
 
     def __str__(self) -> str:
         parameter = _PARAMETERS.get(self.name)
-        return self.name if parameter is None else f"{self.name}={getattr(self, parameter):g}"
+        return self.name if parameter is None else f"{self.name}={getattr(self, parameter):.12g}"
 
     def words(self, minimized: bool = False) -> str:
         """Return the measure in words, such as "mean of the worst 10 %"; `minimized`: where low values are good."""
@@ -85,8 +88,8 @@ class Risk:
             "mean": "mean",
             "mean-std": f"{taken_off} standard deviation{several}",
             "mean-variance": f"{taken_off} variance{several}",
-            "var": f"{100.0 * share:g} % quantile",
-            "cvar": f"mean of the worst {100.0 * self.alpha:g} %",
+            "var": f"{100.0 * share:.10g} % quantile",
+            "cvar": f"mean of the worst {100.0 * self.alpha:.10g} %",
             "worst": "worst case",
         }[self.name]
 
@@ -167,6 +170,12 @@ class RiskImprovement:
         """
         other = copy(self)
         other._finer = finer
+        return other
+
+    def mirrored(self) -> "RiskImprovement":
+        """Return the improvement by these draws and their mirror images about the mean, whose mean is exact."""
+        other = copy(self)
+        other._normals = np.concatenate([self._normals, -self._normals])
         return other
 
     def over(self, points: NDArray[np.float64]) -> "RiskImprovement":

@@ -153,13 +153,19 @@ class Ranking:
             return self._expected(posterior).expectation(U)
         return self._expected(posterior.thinned(SCREENING_DIVISOR)).corrected(finer).expectation(U)
 
+    def worth(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what is stated of U (q, d): as `measure`, of all particles and of draws whose mean is exact, (q,)."""
+        if self.risk.name == "mean":
+            return self.measure(posterior, U)
+        return self._expected(posterior).mirrored().corrected(self.correction(posterior)).expectation(U)
+
     def judged(
         self, posterior: Posterior, one: NDArray[np.float64], other: NDArray[np.float64]
     ) -> tuple[float, float] | None:
         """Return what two points (d,) are worth by the risk measure; None where the mean decides."""
         if self.risk.name == "mean" or self.exact_inputs:
             return None
-        one_is, other_is = self.measure(posterior, np.array([one, other])).tolist()
+        one_is, other_is = self.worth(posterior, np.array([one, other])).tolist()
         return one_is, other_is
 
     def correction(self, posterior: Posterior) -> Perturbations | None:
