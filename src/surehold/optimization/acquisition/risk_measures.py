@@ -5,8 +5,8 @@ Legend
     weights   w_i of the perturbations, (s,), positive, summing to 1
     rho       risk measure of one draw, larger is better; its distribution over draws is what the model knows of it
     alpha     share of the worst outcomes that counts, in (0, 1)
-    beta      standard deviations or variances taken off the mean; in the worst case standard deviations added to and
-              taken off the model's mean
+    beta      standard deviations or variances taken off the mean
+    kappa     of the worst case: standard deviations added to and taken off the model's mean
 """
 
 from copy import copy
