@@ -184,7 +184,7 @@ def test_the_standard_error_of_a_measure_is_that_of_normal_samples(paired):
     risk = Risk("mean-std", beta=2.0)
     pair = shaken("highest observed", 5.0, one), shaken("recommended", 3.0, 1.0 + other)
     if not paired:
-        pair = pair[0], replace(pair[1], n_failed=1, lost=1.0)
+        pair = pair[0], replace(pair[1], n_failed=1, without_value=1.0)
     told = verdict(report(*(averse(candidate, risk) for candidate in pair)))
     error = float(re.search(r"standard error ([\d.]+)", told.text)[1])
     assert error == pytest.approx(np.sqrt(2.0 * (1.0 / n + 4.0 / (2.0 * n))), rel=0.15)
@@ -213,7 +213,7 @@ def test_the_headline_of_a_single_point_states_the_measure():
 def test_a_re_query_without_a_value_is_no_merit(name):
     sound = averse(shaken("highest observed", 1.0, np.linspace(0.8, 0.9, 100)), Risk(name))
     lucky = averse(shaken("recommended", 0.96, np.full(20, 0.95)), Risk(name))
-    lost = replace(lucky, n_failed=80, lost=-3.0)
+    lost = replace(lucky, n_failed=80, without_value=-3.0)
     assert verdict(report(sound, lucky)).refused == (name != "worst")  # by .15 of a range of 2 it is a tie
     assert lost.worth == pytest.approx(-3.0)
     told = verdict(report(sound, lost))

@@ -89,7 +89,7 @@ def candidate(
         scene,
         minimized=result.optimizer.direction == "minimize",
         risk=result.optimizer.risk,
-        lost=float(np.nanmax(result.y) if result.optimizer.direction == "minimize" else np.nanmin(result.y)),
+        without_value=float(np.nanmax(result.y) if result.optimizer.direction == "minimize" else np.nanmin(result.y)),
         predicted_worth=None if told is None or score is None else told.by_risk,
     )
 

@@ -58,19 +58,7 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
                 "What many executions give on average. Its uncertainty is what the model does not know yet; it shrinks "
                 "with further trials.",
             ),
-            *(
-                []
-                if report.risk.name == "mean"
-                else [
-                    (
-                        report.risk.words(report.minimized),
-                        f"What the recommended point should have as {'low' if report.minimized else 'high'} as "
-                        "possible, in place of the mean: that is what was asked for."
-                        + " A re-query without a value counts as the worst value of the run."
-                        * any(candidate.n_failed for candidate in report.candidates),
-                    )
-                ]
-            ),
+            *_measure(report),
             (
                 "one execution",
                 "What the next execution gives. Its standard deviation holds the input noise, the noise of the "
@@ -95,3 +83,14 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
     if "s1" in [v.name for v in report.variables] or any("s1" in c.pose for c in report.candidates):
         words.append(("s1", "Posture of the hand along its first synergy, in radians; here it turns the thumb."))
     return words
+
+
+def _measure(report: RunReport) -> list[tuple[str, str]]:
+    """Return the risk measure that was asked for, with its meaning; nothing where that is the mean."""
+    if report.risk.name == "mean":
+        return []
+    extreme = "low" if report.minimized else "high"
+    meaning = f"What was asked for in place of the mean: it should be as {extreme} as possible."
+    if any(candidate.n_failed for candidate in report.candidates):
+        meaning += " A re-query without a value counts as the worst value of the run."
+    return [(report.risk.words(report.minimized), meaning)]

@@ -151,9 +151,9 @@ class Candidate:
     noise: Floats | None = None  #: (d, d) covariance of the input noise at x, in the units of the box
     minimized: bool = False  #: whether lower values are better
     risk: Risk = field(default_factory=Risk)  #: what the run was asked to maximize of the outcome
-    lost: float = float(
-        "nan"
-    )  #: what a re-query without a value counts as by a risk measure: the worst value of the run
+    without_value: float = (
+        math.nan
+    )  #: what a re-query that gave none counts as by a risk measure: the run's worst value
     predicted_worth: float | None = None  #: what the model expects the point to be worth by it, if it is not the mean
 
     @property
@@ -161,7 +161,9 @@ class Candidate:
         """What the re-queries are worth by the risk measure that was asked for, by default their mean; or NaN."""
         if self.risk.name == "mean" or not self.values.size:
             return self.mean
-        return self.risk.of_executions(np.append(self.values, np.full(self.n_failed, self.lost)), self.minimized)
+        return self.risk.of_executions(
+            np.append(self.values, np.full(self.n_failed, self.without_value)), self.minimized
+        )
 
     @property
     def mean(self) -> float:
