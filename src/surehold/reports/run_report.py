@@ -151,9 +151,7 @@ class Candidate:
     noise: Floats | None = None  #: (d, d) covariance of the input noise at x, in the units of the box
     minimized: bool = False  #: whether lower values are better
     risk: Risk = field(default_factory=Risk)  #: what the run was asked to maximize of the outcome
-    without_value: float = (
-        math.nan
-    )  #: what a re-query that gave none counts as by a risk measure: the run's worst value
+    without_value: float = math.nan  #: what a re-query that gave none counts as by a risk measure: the worst of the run
     predicted_worth: float | None = None  #: what the model expects the point to be worth by it, if it is not the mean
 
     @property
@@ -161,9 +159,8 @@ class Candidate:
         """What the re-queries are worth by the risk measure that was asked for, by default their mean; or NaN."""
         if self.risk.name == "mean" or not self.values.size:
             return self.mean
-        return self.risk.of_executions(
-            np.append(self.values, np.full(self.n_failed, self.without_value)), self.minimized
-        )
+        values = np.append(self.values, np.full(self.n_failed, self.without_value))
+        return self.risk.of_executions(values, self.minimized)
 
     @property
     def mean(self) -> float:
