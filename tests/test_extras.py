@@ -59,6 +59,23 @@ def test_a_part_whose_extra_is_missing_names_the_command(extra):
     assert last.endswith(f"run: pip install 'surehold[{extra}]'.")
 
 
+def test_reports_of_runs_and_campaigns_do_without_studies():
+    """As `make grasp` installs them; a report of a study is one of studies."""
+    needed = {name for extra in ("campaign", "cli", "grasp", "report") for name in EXTRAS[extra]}
+    missing = sorted({MODULES.get(name, name) for name in set(EXTRAS["study"]) - needed})
+    assert "optuna" in missing
+    code = """
+import importlib, pkgutil
+for floor in ("surehold.reports", "surehold.campaigns"):
+    for module in pkgutil.walk_packages(importlib.import_module(floor).__path__, f"{floor}."):
+        if module.name != "surehold.reports.study_report":
+            importlib.import_module(module.name)
+print("works")
+"""
+    done = python(f"import sys\nfor name in {missing}: sys.modules[name] = None\n{code}")
+    assert done.stdout == "works\n", done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "blocked", "extra"),
     [

@@ -11,7 +11,7 @@ from surehold.reports import figures
 from surehold.reports.campaign_report import CampaignReport, Table
 from surehold.reports.page import TEMPLATES, environment, scene_context
 from surehold.reports.run_report import Candidate
-from surehold.studies.csv_cells import written_cell
+from surehold.store.csv_cells import written_cell
 
 __all__ = ["csv_text", "markdown_table", "render_campaigns"]
 

@@ -90,7 +90,7 @@ def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
     counts, _ = np.histogram(candidate.values, edges)
     axes.bar(edges[:-1], counts, np.diff(edges), align="edge", color=color, alpha=0.75, linewidth=0)
     axes.axvline(candidate.quality, color=PALETTE["ink"], linestyle=(0, (4, 2)), linewidth=1.2)
-    at = float(np.clip(candidate.worth, edges[0], edges[-1]))  # re-queries without a value may put it beyond
+    at = float(np.clip(candidate.worth, edges[0], edges[-1]))  # a risk measure may lie beyond all values
     axes.plot(at, 0, marker="D", color=color, markeredgecolor=PALETTE["ink"], clip_on=False, zorder=5)
     right = candidate.quality > 0.6 * edges[-1] + 0.4 * edges[0]
     axes.annotate(

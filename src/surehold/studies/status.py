@@ -8,7 +8,7 @@ from typing import Any
 
 from optuna.trial import FrozenTrial, TrialState
 
-from surehold.studies.csv_cells import written_cell
+from surehold.store.csv_cells import written_cell
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
 from surehold.studies.ledger import NOTE, VETOED, holder_of
 from surehold.studies.robot import RobotStudy

@@ -15,7 +15,7 @@ from optuna.trial import TrialState
 
 from surehold.errors import InputError
 from surehold.optimization.limits import checked_outputs
-from surehold.studies.csv_cells import cell_text
+from surehold.store.csv_cells import cell_text
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED
 from surehold.studies.ledger import NOTE, checked_value
 from surehold.studies.robot import RobotStudy
