@@ -83,8 +83,9 @@ AT_THE_PLACE: Final = 3.0
 #: Share of a sigma point's offset at which a trial beside the candidate is considered, besides the whole offset. Never
 #: measured.
 LOOK_BETWEEN: Final = 0.5
-#: Joint draws of each particle in the improvement of a risk measure. Common random numbers make it smooth in the query.
-#: Never measured; the measures as a whole: surehold campaign run risk-measures.
+#: Joint draws of each particle in the improvement of a risk measure, half of them mirror images of the others. Common
+#: random numbers make it smooth in the query. Never measured; the measures as a whole: surehold campaign run
+#: risk-measures.
 RISK_DRAWS: Final = 16
 #: Standard deviations of the upper confidence bound by which Thompson sampling chooses the points of its joint draw.
 #: A draw's maximum elsewhere is improbable. Never measured.
