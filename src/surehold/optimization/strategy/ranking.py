@@ -168,8 +168,12 @@ class Ranking:
         return self._expected(posterior).corrected(self.correction(posterior)).expectation(U)
 
     def margin(self, history: History, scale: Scale) -> float:
-        """Return the improvement that does not count, in the outputs' units."""
-        polish = history.told % POLISH_PERIOD == 0 and not len(history.pending)
+        """Return the improvement that does not count, in the outputs' units.
+
+        Any counts on every third trial; under a risk measure on the one before that, too.
+        """
+        turns = (0,) if self.risk.name == "mean" else (0, POLISH_PERIOD - 1)
+        polish = history.told % POLISH_PERIOD in turns and not len(history.pending)
         if self.noisy or polish:
             return 0.0
         return (MARGIN if scale == "exact" else MARGIN_UNDER_NOISE) * history.spread
