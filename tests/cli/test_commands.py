@@ -42,6 +42,18 @@ def terminated(x):
         os.kill(os.getpid(), signal.SIGTERM)
     return float(-x[0])
 
+def ended_later(x):
+    global calls
+    calls += 1
+    if calls == 14:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 1.0 - float((x[0] - 0.3) ** 2)
+
+def near_the_edge(x):
+    if x[0] > 0.5:
+        raise RuntimeError("over the edge")
+    return float(x[0])
+
 def stopped_at_once(x):
     os.kill(os.getpid(), signal.SIGINT)
     return 0.0
@@ -132,6 +144,33 @@ def test_plain_method_is_scored_under_the_noise_too(here, capsys):
     assert data["robust"] is None
     assert len(data["candidates"][0]["requeries"]["values"]) == 100
     capsys.readouterr()
+
+
+def test_without_re_queries_the_model_is_asked(here, capsys):
+    line = "maximize own.py:hill --bounds a=0:1,b=0:1 --trials 12 --initial 8 --noise 0.05 --requeries 0 --out out"
+    assert surehold(line) == 0
+    assert "the model expects" in " ".join(capsys.readouterr().out.split())
+    data = json.loads((here / "out" / "result.json").read_text())
+    assert all(candidate["predicted_mean"] is not None for candidate in data["candidates"])
+
+
+def test_re_queries_that_fail_are_no_merit(here, capsys):
+    line = "maximize own.py:near_the_edge --bounds x=0:1 --trials 14 --initial 6 --noise 0.03 --method bo --out out"
+    assert surehold(f"{line} --tolerate-failures") == 0
+    said = " ".join(capsys.readouterr().out.split())
+    failed = json.loads((here / "out" / "result.json").read_text())["candidates"][-1]["requeries"]["failed"]
+    assert failed > 10
+    assert f"no value at worst when the input is off. {failed} of 100 re-queries" in said
+
+
+def test_a_run_that_is_killed_while_it_is_queried_again_is_kept(here):
+    command = "maximize own.py:ended_later --bounds x=0:1 --trials 12 --initial 6 --noise 0.03 --out out"
+    code = f"from surehold.cli import run; run({command.split()!r})"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, cwd=here, check=False)
+    assert ended.returncode == -signal.SIGKILL
+    data = json.loads((here / "out" / "result.json").read_text())
+    assert len(data["trials"]["y"]) == 12
+    assert data["candidates"][-1]["predicted_mean"] is not None
 
 
 def test_no_noise_at_all(here, capsys):

@@ -66,7 +66,7 @@ def test_the_page_says_what_is_recommended(study):
     page = render(report)
     assert "The highest peak (0.880) is not recommended: when the input is off, the model expects" in page
     assert "1 trial is still under way" in page
-    assert f"trial {report.recommended.trial} of" in page
+    assert f"trial {report.recommended.trial}, one of" in page
 
 
 def test_a_study_without_values_has_no_report(tmp_path):

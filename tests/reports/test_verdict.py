@@ -92,7 +92,7 @@ def test_one_candidate_and_no_queries():
     assert "No re-queries" in quiet.text
     assert "dx = 3.10 mm, rx = 28.6°, s = 0.250" in quiet.text
     lost = verdict(report(replace(shaken("recommended", 3.0, []), n_failed=100)))
-    assert "All 100 re-queries" in lost.text
+    assert "all 100 re-queries of it failed" in lost.headline
 
 
 @pytest.mark.parametrize(
@@ -219,6 +219,29 @@ def test_a_re_query_without_a_value_is_no_merit(name):
     told = verdict(report(sound, lost))
     assert not told.refused
     assert "do not bear it out" in told.headline
+
+
+def test_re_queries_that_fail_are_said_first():
+    values = 2.0 + 0.01 * SPREAD
+    fails = replace(shaken("recommended", 2.0, values[:40]), n_failed=10)
+    told = verdict(report(fails, robust_trace=np.zeros(4)))
+    assert "2.00 on average and no value at worst" in told.headline
+    assert told.headline.endswith("10 of 50 re-queries of the recommended point failed.")
+    assert fails.worst == fails.bad == -np.inf
+    assert replace(fails, minimized=True).bad == np.inf
+    assert replace(fails, n_failed=1).bad == np.sort(values[:40])[1]  # of 41 two count as bad
+    sound = shaken("highest observed", 2.1, values)
+    assert "falls to no value at worst" in verdict(report(sound, fails)).headline
+
+
+def test_a_point_whose_re_queries_all_fail_does_not_hold():
+    nothing = replace(shaken("recommended", 2.0, []), n_failed=50, predicted_mean=1.9)
+    told = verdict(report(nothing))
+    assert told.headline.startswith("The recommended point does not hold")
+    peak = replace(shaken("highest observed", 3.0, []), n_failed=50)
+    told = verdict(report(peak, shaken("recommended", 2.0, 2.0 + 0.01 * SPREAD)))
+    assert told.refused
+    assert "all 50 re-queries of it failed, the recommended point is worth 2.00 on average" in told.headline
 
 
 def test_points_that_are_worth_the_same_are_said_to_be_whatever_the_error():

@@ -15,14 +15,19 @@ _ENDING: Final = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") i
 
 
 @contextmanager
-def terminable() -> Iterator[None]:
-    """Let SIGTERM, and SIGHUP unless it is ignored (nohup), do in the block what Ctrl-C does."""
+def terminable() -> Iterator[list[int]]:
+    """Let SIGTERM, and SIGHUP unless it is ignored (nohup), do in the block what Ctrl-C does.
 
-    def end(*_: Any) -> None:
+    Yields the list of those that came: what sends them may soon end the program by force.
+    """
+    came: list[int] = []
+
+    def end(number: int, _: Any) -> None:
+        came.append(number)
         raise KeyboardInterrupt
 
     with _handling([s for s in _ENDING if signal.getsignal(s) != signal.SIG_IGN], end):
-        yield
+        yield came
 
 
 @contextmanager

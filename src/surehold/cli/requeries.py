@@ -1,7 +1,7 @@
 """The perturbed re-queries of a run's points: announced where they take long, left out at Ctrl-C."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Collection
 
 from rich.console import Console
 
@@ -18,19 +18,17 @@ _SOON = 2.0  # seconds of silence
 def requeried(
     problem: Problem,
     result: Result,
-    answers: Mapping[str, int],
-    noise: InputNoise | None,
+    noise: InputNoise,
     n: int,
     seed: int,
+    answers: Collection[tuple[str, int]],
     console: Console,
 ) -> tuple[dict[tuple[str, int], RobustScore | None], list[str]]:
-    """Return the score of each of the answers {label: trial}, None where there is none, and notes on what is missing.
+    """Return the score of each of the answers (label, trial), None where there is none, and notes on what is missing.
 
     The problem is queried n times around each of them.
     """
-    scores: dict[tuple[str, int], RobustScore | None] = dict.fromkeys(answers.items())
-    if noise is None or n == 0:
-        return scores, []
+    scores: dict[tuple[str, int], RobustScore | None] = dict.fromkeys(answers)
     started, done, said = time.perf_counter(), 0, False
 
     def told(_: float) -> None:
@@ -39,7 +37,7 @@ def requeried(
         if not said and time.perf_counter() - started > _SOON:
             said = True
             console.print(
-                f"Re-querying {' and '.join(f'the {label} point' for label in answers)} {n} times with the noise: "
+                f"Re-querying {' and '.join(f'the {label} point' for label, _ in answers)} {n} times with the noise: "
                 f"{done} of {n * len(scores)} done. "
                 "Ctrl-C leaves the rest out; --requeries sets the number, 0 for none."
             )

@@ -25,6 +25,7 @@ from surehold.errors import InputError, SureholdError
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.maximization import Result, Trial, maximize
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.problems.perturbation import RobustScore
 from surehold.problems.problem import Problem
 from surehold.reports import files, gather, page
 from surehold.reports.run_report import Candidate, RunReport
@@ -117,7 +118,7 @@ def run_session(
     """
     console = console or terminal()
     started = time.perf_counter()
-    with terminable(), _new_folder_removed_on_error(folder):
+    with terminable() as ended, _new_folder_removed_on_error(folder):
         for name, count, least in (("trials", trials, 1), ("initial", initial, 1), ("requeries", requeries, 0)):
             if count < least:
                 raise InputError(f"--{name} is {count}; give {least} or more.")
@@ -160,11 +161,9 @@ def run_session(
             result = _as_study(kept, problem, trials, options, units or {}, console)
         if result.interrupted:
             console.print(f"Interrupted after {len(result.y)} of {amount(trials, 'trial')}; keeping what was done.")
-        notes = _failures(result)
-        scores, missing = requeried(problem, result, gather.answers(result), noise, requeries, seed, console)
-        notes = [*notes, *missing]
-        with undisturbed(console):
-            report = gather.report_of(
+
+        def reported(scores: Mapping[tuple[str, int], RobustScore | None], missing: list[str]) -> RunReport:
+            return gather.report_of(
                 result,
                 [describe(gather.candidate(result, label, i, score)) for (label, i), score in scores.items()],
                 title=title,
@@ -182,11 +181,22 @@ def run_session(
                 quality_name=quality_name,
                 disturbance=disturbance,
                 planned_trials=trials,
-                notes=notes,
+                notes=[*_failures(result), *missing],
                 success_above=success_above,
                 outcomes={} if _any_above(result, success_above) else outcomes(result),
                 advice=advice,
             )
+
+        shown: dict[tuple[str, int], RobustScore | None] = dict.fromkeys(gather.answers(result).items())
+        missing: list[str] = []
+        if noise is not None and requeries and ended:
+            missing = ["The run was ended from outside; nothing was queried again."]
+        elif noise is not None and requeries:
+            with undisturbed(console):  # what follows may take as long as the trials did
+                files.write_result(reported(shown, ["The re-queries were not finished."]), folder)
+            shown, missing = requeried(problem, result, noise, requeries, seed, shown, console)
+        with undisturbed(console):
+            report = reported(shown, missing)
             with listed_writes(folder, replacing=True) as removed:
                 path = files.write_run(report, folder)
                 also_write(report, folder)

@@ -100,8 +100,15 @@ class Asking:
         return self._anywhere(trials, rng)  # every candidate has been tried already
 
     def _anywhere(self, trials: Trials, rng: np.random.Generator) -> NDArray[np.float64]:
-        if self._parts.requirements is not None:
-            return self._parts.requirements.otherwise(trials, rng)
+        requirements, lattice = self._parts.requirements, self._parts.lattice
+        if lattice is not None and not lattice.smooth.any() and (requirements is None or requirements.safety is None):
+            tried = np.concatenate([trials.commanded, trials.pending])
+            region = None if requirements is None else requirements.region
+            found = lattice.untried(tried, rng, None if region is None else region.contains)
+            if found is not None:
+                return found
+        if requirements is not None:
+            return requirements.otherwise(trials, rng)
         return rng.random(self._box.dimension)
 
     def _snapped(self, U: NDArray[np.float64]) -> NDArray[np.float64]:

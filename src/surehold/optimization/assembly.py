@@ -175,6 +175,8 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     rest = initial_design(s.design, max(n_initial - len(first), 1), box.dimension, rng)
     if requirements is not None:
         rest = requirements.initial(rest, first, rng)
+    if lattice is not None and thesis is None and not strategy.ranking.noisy:
+        rest = lattice.distinct(rest, first, rng, None if region is None else region.contains)
     stored = {"initial_points": None if s.initial_points is None else box.from_unit(first).tolist()}
     return Parts(
         settings={**settings, **stored},

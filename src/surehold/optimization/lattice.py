@@ -15,6 +15,11 @@ from numpy.typing import NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions, means
+from surehold.optimization.trials import same
+
+Allowed = Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None
+
+_POOL: Final = 1024  # random points among which one is sought that has not been tried
 
 __all__ = ["Lattice", "LatticePosterior", "lattice_of"]
 
@@ -27,6 +32,27 @@ class Lattice:
     """maps points (..., d) to the nearest ones that can be tried; those stay where they are"""
     smooth: NDArray[np.bool_]
     """whether a coordinate can be tried everywhere, (d,)"""
+
+    def distinct(
+        self, points: NDArray[np.float64], before: NDArray[np.float64], rng: np.random.Generator, allowed: Allowed
+    ) -> NDArray[np.float64]:
+        """Return points (n, d), each replaced that is the same trial as one `before` (k, d) or in an earlier row."""
+        if self.smooth.any():  # no two random points are the same trial
+            return points
+        made = list(self.snap(before))
+        for point in self.snap(points):
+            again = len(made) > 0 and bool(same(point, np.array(made)).any())
+            other = self.untried(np.array(made), rng, allowed) if again else None
+            made.append(point if other is None else other)
+        return np.array(made[len(before) :])
+
+    def untried(
+        self, tried: NDArray[np.float64], rng: np.random.Generator, allowed: Allowed
+    ) -> NDArray[np.float64] | None:
+        """Return an allowed point (d,) that is none of those tried (t, d); None where a random search finds none."""
+        pool = self.snap(rng.random((_POOL, len(self.smooth))))
+        pool = pool if allowed is None else pool[allowed(pool)]
+        return next((point for point in pool if not same(point, tried).any()), None)
 
 
 def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | None:

@@ -11,7 +11,7 @@ from surehold.reports import figures, page
 from surehold.reports.run_report import Candidate, RunReport
 from surehold.store.atomic import checked_folder, write_file
 
-__all__ = ["result_data", "write_run"]
+__all__ = ["result_data", "write_result", "write_run"]
 
 
 def write_run(report: RunReport, folder: str | Path) -> Path:
@@ -24,7 +24,7 @@ def write_run(report: RunReport, folder: str | Path) -> Path:
     """
     path = checked_folder(folder)
     pictures = checked_folder(path / "figures")
-    write_file(path / "result.json", json.dumps(result_data(report), indent=2, allow_nan=False) + "\n")
+    write_result(report, path)
     drawn = figures.figures(report)
     drawings = {name: figures.svg_text(figure, name) for name, figure in drawn.items()}
     write_file(path / "report.html", page.render(report, drawings))
@@ -32,6 +32,12 @@ def write_run(report: RunReport, folder: str | Path) -> Path:
         write_file(pictures / f"{name}.svg", figures.on_white(drawings[name]))
         write_file(pictures / f"{name}.png", figures.png_bytes(figure))
     return path / "report.html"
+
+
+def write_result(report: RunReport, folder: str | Path) -> None:
+    """Write result.json alone; raises InputError if the folder cannot be written."""
+    text = json.dumps(result_data(report), indent=2, allow_nan=False) + "\n"
+    write_file(checked_folder(folder) / "result.json", text)
 
 
 def result_data(report: RunReport) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from surehold.reports.surfaces import surfaces_of
 if TYPE_CHECKING:
     from surehold.grasping.pictures.scene import Scene as GraspScene
 
-__all__ = ["answers", "candidate", "drawn_scene", "expected", "report_of"]
+__all__ = ["answers", "candidate", "drawn_scene", "report_of"]
 
 _SHARES = (0.9, 0.99)  # of executions that succeed, of which the page says how sure they are
 _ADVICE = "Give more trials, a wider box, or count as success what is easier to reach."
@@ -64,51 +64,48 @@ def candidate(
     scene: Scene | None = None,
 ) -> Candidate:
     """Return the candidate of trial `index` with its re-queries; what the model expects of it where that is known."""
-    told = result.recommendation if label == "recommended" else None
-    counted = result.optimizer.outcome == "success"
-    if told is not None and counted:
+    best, optimizer = result.recommendation, result.optimizer
+    counted = optimizer.outcome == "success"
+    if label == "recommended" and counted:
         sure = {
-            f"sure that at least {100 * share:.0f} % of executions succeed": told.probability_of_share(share)
+            f"sure that at least {100 * share:.0f} % of executions succeed": best.probability_of_share(share)
             for share in _SHARES
         }
         details = {**{name: f"{100.0 * p:.0f} %" for name, p in sure.items()}, **(details or {})}
     return Candidate(
         label,
-        result.optimizer.reached[index],
+        optimizer.reached[index],
         float(result.y[index]),
         index,
         np.empty(0) if score is None else score.values,
         np.empty((0, result.X.shape[1])) if score is None else score.points,
         0 if score is None else score.n_failed,
-        None if told is None or (score is None and not counted) else told.mean,
-        None if told is None or score is None else told.std,
-        None if told is None or (score is None and not counted) else told.expectation.std,
-        status,
-        pose,
-        details or {},
-        scene,
-        minimized=result.optimizer.direction == "minimize",
-        risk=result.optimizer.risk,
-        without_value=float(np.nanmax(result.y) if result.optimizer.direction == "minimize" else np.nanmin(result.y)),
-        predicted_worth=None if told is None or score is None else told.by_risk,
+        status=status,
+        pose=pose,
+        details=details or {},
+        scene=scene,
+        minimized=optimizer.direction == "minimize",
+        risk=optimizer.risk,
+        without_value=float(np.nanmax(result.y) if optimizer.direction == "minimize" else np.nanmin(result.y)),
+        **_predicted(result, label == "recommended", index, score is not None),
     )
 
 
-def expected(result: Result, candidate: Candidate) -> Candidate:
-    """Return a candidate that was not queried again with what the model expects of it under the noise."""
-    best = result.recommendation
-    if candidate.label == "recommended":
-        return replace(
-            candidate,
-            predicted_mean=best.mean,
-            predicted_std=best.std,
-            predicted_error=best.expectation.std,
-            predicted_worth=best.by_risk,
-        )
-    x = candidate.x[None, :]
-    mean, std = result.optimizer.predict(x, under_noise=True)
-    worth = None if best.by_risk is None else float(result.optimizer.risk_measure(x)[0])
-    return replace(candidate, predicted_mean=float(mean[0]), predicted_error=float(std[0]), predicted_worth=worth)
+def _predicted(result: Result, recommended: bool, index: int, queried: bool) -> dict[str, Any]:
+    """Return what the model expects of a trial under the noise; of one that is not the answer where nobody looked."""
+    best, optimizer = result.recommendation, result.optimizer
+    disturbed = optimizer.input_noise is not None or optimizer.box.uncontrolled is not None
+    found: dict[str, Any] = {}
+    if recommended and (disturbed or queried or optimizer.outcome == "success"):
+        found = {"predicted_mean": best.mean, "predicted_error": best.expectation.std}
+    if recommended and (disturbed or queried):
+        found |= {"predicted_std": best.std, "predicted_worth": best.by_risk}
+    if not recommended and disturbed and not queried:
+        x = optimizer.reached[index][None, :]
+        mean, error = optimizer.predict(x, under_noise=True)
+        worth = None if best.by_risk is None else float(optimizer.risk_measure(x)[0])
+        found = {"predicted_mean": float(mean[0]), "predicted_error": float(error[0]), "predicted_worth": worth}
+    return found
 
 
 def _of_constraints(result: Result) -> list[str]:

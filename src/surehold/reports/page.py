@@ -169,7 +169,7 @@ def _card(report: RunReport, candidate: Candidate, refused: bool, drawings: Mapp
         "mean_is": f"of {candidate.values.size} re-queries succeeded" if report.counted else report.manner,
         "worst": worth(report, candidate.worst),
         "std": number(candidate.std, 2),
-        "n": candidate.values.size,
+        "n": candidate.values.size + candidate.n_failed,
         "halved": halved(candidate),
         "change": change(candidate) if shaken and not report.counted and report.risk.name == "mean" else "",
         "svg": svg,
@@ -254,16 +254,17 @@ def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
     else:
         rows.append(row(f"{report.quality_name}, hit exactly", lambda c: worth(report, c.quality, 4)))
     if any(c.values.size for c in every) and not report.counted:
-        n = max(c.values.size + c.n_failed for c in every)
-        rows.append(row(f"mean of {n} perturbed re-queries", lambda c: worth(report, c.mean, 4)))
+        n, failed = max(c.values.size + c.n_failed for c in every), any(c.n_failed for c in every)
+        those = "those perturbed re-queries that gave a value" if failed else f"{n} perturbed re-queries"
+        rows.append(row(f"mean of {those}", lambda c: worth(report, c.mean, 4)))
         if report.risk.name not in ("mean", "worst"):
             rows.append(row(f"{report.risk.words(report.minimized)} of them", lambda c: worth(report, c.worth, 4)))
         if report.risk != Risk("var", alpha=0.05):  # which is the same but for how the quantile is interpolated
             rows.append(row("95 % of them are better than", lambda c: worth(report, c.bad, 4)))
         rows.append(row("worst of them", lambda c: worth(report, c.worst, 4)))
         rows.append(row("standard deviation", lambda c: number(c.std, 3)))
-        if any(c.n_failed for c in every):
-            rows.append(row("re-queries without value", lambda c: str(c.n_failed)))
+        if failed:
+            rows.append(row(f"re-queries without a value, of {n}", lambda c: str(c.n_failed)))
     if any(c.predicted_mean is not None for c in every):
         what = "share of executions that succeeds" if report.counted else "mean under the noise"
         rows.append(row(f"model: {what} ± its uncertainty", lambda c: _expected(report, c, c.predicted_error)))

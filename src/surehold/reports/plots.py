@@ -60,8 +60,7 @@ def result_report(result: Result, function: Callable[[Any], float] | None = None
         if function is not None and disturbed:
             problem = Function(function if box.plain else lambda x: function(box.as_dict(x)), box)
             score = robust_score(problem, result.X[index], noise, _REQUERIES, optimizer.seed)
-        found = gather.candidate(result, label, index, score)
-        candidates.append(found if score is not None or not disturbed else gather.expected(result, found))
+        candidates.append(gather.candidate(result, label, index, score))
     plain = [box.as_dict(x) for x in result.X]
     texts = [variable.name for variable in box.variables if variable.name not in box.names]
     units = {v.name: "log" for v in box.variables if v.name in box.names and getattr(v, "log", False)}

@@ -176,15 +176,24 @@ class Candidate:
 
     @property
     def bad(self) -> float:
-        """The value that 95 % of the re-queries are better than; NaN if there are none."""
-        return float(np.quantile(self.values, 0.95 if self.minimized else 0.05)) if self.values.size else float("nan")
+        """The value that 95 % of the re-queries are better than; NaN if there are none.
+
+        Infinite where so many gave no value.
+        """
+        if not self.values.size:
+            return float("nan")
+        without = math.inf if self.minimized else -math.inf
+        values = np.append(self.values, np.full(self.n_failed, without))
+        method = ("higher" if self.minimized else "lower") if self.n_failed else "linear"  # between it and a number
+        return float(np.quantile(values, 0.95 if self.minimized else 0.05, method=method))
 
     @property
     def worst(self) -> float:
-        """The worst of the re-queries; NaN if there are none."""
+        """The worst of the re-queries; NaN if there are none, infinite where one of them gave no value."""
         if self.values.size == 0:
             return float("nan")
-        return float(np.max(self.values) if self.minimized else np.min(self.values))
+        worst = float(np.max(self.values) if self.minimized else np.min(self.values))
+        return (math.inf if self.minimized else -math.inf) if self.n_failed else worst
 
 
 @dataclass(frozen=True)

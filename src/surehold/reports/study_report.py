@@ -2,9 +2,8 @@
 
 from typing import Any
 
-from surehold.optimization.maximization import Result
 from surehold.reports import gather
-from surehold.reports.run_report import Candidate, RunReport
+from surehold.reports.run_report import RunReport
 from surehold.studies.replay import result_of
 from surehold.studies.robot import RobotStudy
 
@@ -32,7 +31,7 @@ def study_report(study: RobotStudy) -> RunReport:
     names = [name for name in space.distributions if name not in box.names]
     return gather.report_of(
         result,
-        [_candidate(result, label, index) for label, index in gather.answers(result).items()],
+        [gather.candidate(result, label, index, None) for label, index in gather.answers(result).items()],
         title=f"Study {study.name}",
         settings=shown,
         noise=result.optimizer.input_noise,
@@ -42,9 +41,3 @@ def study_report(study: RobotStudy) -> RunReport:
         choices={name: tuple(str(row[name]) for row in rows) for name in names},
         hidden=[name for name in box.names if name not in space.distributions],
     )
-
-
-def _candidate(result: Result, label: str, index: int) -> Candidate:
-    """Return a trial with what the model expects of it where the input is off; the robot does not make it again."""
-    found = gather.candidate(result, label, index, None)
-    return found if result.optimizer.input_noise is None else gather.expected(result, found)

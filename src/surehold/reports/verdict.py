@@ -34,7 +34,8 @@ def _said(report: RunReport) -> Callable[[float | None], str]:
 def verdict(report: RunReport) -> Verdict:
     """Return headline and paragraph for a run; the paragraph ends with what is wrong with the model."""
     found = _of_the_run(report)
-    return replace(found, text=f"{found.text} {report.warning}".strip())
+    headline = f"{found.headline}{_without_value(report)}"
+    return replace(found, headline=headline, text=f"{found.text} {report.warning}".strip())
 
 
 def _of_the_run(report: RunReport) -> Verdict:
@@ -54,15 +55,24 @@ def _of_the_run(report: RunReport) -> Verdict:
             "narrow the search to where outcomes differ.",
             False,
         )
+    if answer.n_failed and not answer.values.size:
+        return Verdict(
+            f"The recommended point does not hold: when {off}, all {answer.n_failed} re-queries of it failed.",
+            f"Hit exactly it gave {said(answer.quality)}, at {coordinates(report, answer)} "
+            f"({_trial_of(report, answer)}). Nothing is known of it when {off}: find out why they failed.",
+            False,
+        )
+    if highest.n_failed and not highest.values.size and answer.values.size:
+        return Verdict(
+            f"The {peak} ({said(highest.quality)}) was refused: when {off}, all {highest.n_failed} re-queries of it "
+            f"failed, the recommended point is worth {said(answer.worth)} {report.manner}.",
+            _sentence(report, answer, "The recommended point"),
+            True,
+        )
     if highest.values.size == 0 and answer.values.size == 0 and answer.predicted_mean is not None:
         return _of_the_model(report)
     if highest.values.size == 0 or answer.values.size == 0:
-        if highest.n_failed:
-            why = f"All {highest.n_failed} re-queries with perturbed inputs failed, so the point does not hold at all."
-        else:
-            why = (
-                f"No re-queries with perturbed inputs were made, so nothing is said here about what happens when {off}."
-            )
+        why = f"No re-queries with perturbed inputs were made, so nothing is said here about what happens when {off}."
         return Verdict(
             f"The best{' feasible' * extreme.endswith('feasible')} {name} found is {said(highest.quality)}.",
             f"It was met at {coordinates(report, highest)} ({_trial_of(report, highest)}). {why}",
@@ -133,6 +143,14 @@ def _of_the_run(report: RunReport) -> Verdict:
     )
     text += " More trials near both points would let the model see this."
     return Verdict(headline, text, False)
+
+
+def _without_value(report: RunReport) -> str:
+    """Return in words how many re-queries of a point gave no value, where others did."""
+    some = [c for c in report.candidates if c.n_failed and c.values.size and report.succeeded]
+    return "".join(
+        f" {c.n_failed} of {c.values.size + c.n_failed} re-queries of the {c.label} point failed." for c in some
+    )
 
 
 def _of_nothing(report: RunReport) -> Verdict:
@@ -282,5 +300,5 @@ def _trial(report: RunReport, candidate: Candidate) -> str:
 
 
 def _trial_of(report: RunReport, candidate: Candidate) -> str:
-    """Return which of how many trials it was; ids of a study may run higher than the number of trials shown."""
-    return f"{_trial(report, candidate)}{', one' * bool(report.ids)} of {report.y.size}"
+    """Return which trial it was, and of how many: they are numbered from 0, or as in a study."""
+    return f"{_trial(report, candidate)}, one of {report.y.size}"

@@ -12,8 +12,10 @@ __all__ = ["change", "coordinate", "coordinates", "halved", "number", "percent",
 def number(value: float | None, digits: int = 3) -> str:
     """Return a value as people write it: `digits` significant digits, no exponent between 0.0001 and 100,000.
 
-    Nor beyond, where so many digits reach behind the point.
+    Nor beyond, where so many digits reach behind the point. Infinity stands for "no value", NaN for nothing known.
     """
+    if value is not None and math.isinf(value):
+        return "no value"
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0.0:
