@@ -55,9 +55,7 @@ MARGIN: Final = 1e-3
 #: python -m benchmarks.robust_regret --problems "gm 0.02" "gm 0.01" --methods default --seeds 30
 MARGIN_UNDER_NOISE: Final = 1e-2
 #: Every third trial counts any improvement, so that a smooth top is still found to many digits. It is due on the same
-#: trials as COVERING_PERIOD: while the search is stalled those trials cover, and none polishes; under a risk measure,
-#: of which a new best trial is seldom sure, the trial before each of them polishes, too. With it the answers on random
-#: smooth functions are as exact as without a margin, and fewer trials are made again: python -m benchmarks.risk_regret.
+#: trials as COVERING_PERIOD: while the search is stalled those trials cover, and none polishes. Never measured.
 POLISH_PERIOD: Final = 3
 
 # --- insurance against a model that is too smooth ---------------------------------------------------------------------
@@ -85,9 +83,8 @@ AT_THE_PLACE: Final = 3.0
 #: Share of a sigma point's offset at which a trial beside the candidate is considered, besides the whole offset. Never
 #: measured.
 LOOK_BETWEEN: Final = 0.5
-#: Joint draws of each particle in the improvement of a risk measure, half of them mirror images of the others. Common
-#: random numbers make it smooth in the query. Never measured; the measures as a whole: surehold campaign run
-#: risk-measures.
+#: Joint draws of each particle in the improvement of a risk measure. Common random numbers make it smooth in the query.
+#: Never measured; the measures as a whole: surehold campaign run risk-measures.
 RISK_DRAWS: Final = 16
 #: Standard deviations of the upper confidence bound by which Thompson sampling chooses the points of its joint draw.
 #: A draw's maximum elsewhere is improbable. Never measured.

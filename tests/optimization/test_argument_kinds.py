@@ -8,6 +8,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.evaluation import evaluate
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 
 BOX = Box({"a": (0.0, 1.0), "b": (-1.0, 2.0)})
 STRANGE = [
@@ -50,6 +51,11 @@ def test_one_line_names_the_argument(name, value):
         Optimizer(BOX, **{name: value})
     assert "\n" not in str(refused.value)
     assert len(str(refused.value)) < 250
+
+
+def test_a_class_is_no_surrogate():
+    with pytest.raises(InputError, match=r"surrogate is <class .*; give a name, an object"):
+        Optimizer(BOX, surrogate=GaussianProcess)
 
 
 @pytest.mark.parametrize("value", [-1, "a", [1], np.array([1.0])])

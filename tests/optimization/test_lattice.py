@@ -84,3 +84,29 @@ def test_only_points_of_the_lattice_are_asked_and_none_twice(surrogate, noise):
         best = optimizer.recommend(where).x
         assert best[0] == pytest.approx(0.7)
         assert abs(best[1] - 0.3) < 0.05
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("variables", "places"),
+    [({"n": (1, 4, "int"), "grip": ["a", "b", "c"]}, 12), ({"grip": ["a", "b", "c"]}, 3), ({"n": (1, 5, "int")}, 5)],
+)
+def test_every_place_is_tried_before_one_is_tried_again(variables, places, seed):
+    optimizer = Optimizer(Box(variables), seed=seed)
+    tried = []
+    for _ in range(places + 2):
+        trial = optimizer.ask_trial()
+        tried.append(tuple(trial.parameters.values()))
+        optimizer.tell(trial.parameters, float(sum(map(len, map(str, tried[-1])))))
+    assert len(set(tried[:places])) == places
+    assert set(tried[places:]) <= set(tried[:places])
+
+
+def test_of_allowed_places_each_is_tried_once():
+    optimizer = Optimizer(Box({"n": (1, 4, "int"), "m": (1, 4, "int")}), allowed="n + m <= 4", seed=1)
+    tried = []
+    for _ in range(6):
+        trial = optimizer.ask_trial()
+        tried.append(tuple(trial.parameters.values()))
+        optimizer.tell(trial.parameters, float(tried[-1][0]))
+    assert sorted(tried) == [(n, m) for n in range(1, 4) for m in range(1, 5 - n)]

@@ -144,12 +144,18 @@ def test_fewer_trials_than_the_default_design():
         ({"n_trials": True}, "n_trials"),
         ({"n_trials": 5, "surrogate": "forest"}, "surrogate"),
         ({"n_trials": 5, "f": 3}, "function"),
+        ({"n_trials": 5, "callback": 3}, "callback is 3; give a function"),
         ({"n_trials": 5, "box": {"x": (0, 1)}}, "Box"),
     ],
 )
 def test_bad_arguments(arguments, words):
     with pytest.raises(InputError, match=words):
         maximize(**({"f": parabola, "box": BOX} | arguments))
+
+
+def test_minimize_does_not_maximize():
+    with pytest.raises(InputError, match="direction is 'maximize'"):
+        minimize(parabola, BOX, n_trials=8, direction="maximize")
 
 
 # --- ending early -------------------------------------------------------------------------------------------------

@@ -49,6 +49,11 @@ def test_full_covariance_and_exact_variables():
     assert np.std(exact[:, 0]) == pytest.approx(0.1, rel=0.3)
 
 
+def test_a_function_without_a_box_is_no_problem():
+    with pytest.raises(InputError, match=r"has no box; give a problem, such as surehold.problems.Function"):
+        robust_score(lambda x: 1.0, [0.5], InputNoise.unit(0.05))
+
+
 def test_failures_are_counted_not_scored():
     def half(x):
         if x[0] > 0.5:

@@ -142,7 +142,10 @@ def noise_of(text: str, method: str) -> InputNoise | None:
             raise InputError("method 'ubo' needs input noise; give --noise, such as 0.03, or choose --method bo.")
         return None
     if "=" not in text:
-        return InputNoise.unit(_number(text))
+        share = _number(text)
+        if share == 0.0:
+            raise InputError("--noise 0 is no input noise; give --noise none --method bo, or how far the input strays.")
+        return InputNoise.unit(share)
     deviations: dict[str, float] = {}
     for part in text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))

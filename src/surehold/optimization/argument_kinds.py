@@ -64,7 +64,9 @@ _KINDS: Final[dict[str, tuple[Callable[[Any], bool], str]]] = {
     ),
     "risk": (lambda value: isinstance(value, (str, Risk)), "a name, or a surehold.Risk"),
     "surrogate": (
-        lambda value: _text_or_none(value) or callable(getattr(value, "condition", None)),
+        lambda value: (
+            _text_or_none(value) or (callable(getattr(value, "condition", None)) and not isinstance(value, type))
+        ),
         "a name, an object such as surehold.GaussianProcess(), or None",
     ),
     "fixed": (lambda value: value is None or isinstance(value, Mapping), "{name: value}, or None"),

@@ -70,7 +70,8 @@ class Diagnosis:
         if self.contradicted:
             return (
                 "Trials at one input gave different values, and the model knows of no observation noise that explains "
-                "it: give noise='inferred', or its standard deviation."
+                "it: give noise='inferred', or its standard deviation; of a study, when it is created "
+                "(--observation-noise)."
             )
         if self.explains_nothing:
             return (

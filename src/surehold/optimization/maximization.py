@@ -237,6 +237,8 @@ def maximize(
     """
     if not callable(f):
         raise InputError(f"f is {f!r}; give a function that takes x (d,) and returns a number.")
+    if callback is not None and not callable(callback):
+        raise InputError(f"callback is {callback!r}; give a function that takes a Trial, or None.")
     n_trials, n_jobs = _count("n_trials", n_trials), _count("n_jobs", n_jobs)
     if timeout is not None and (isinstance(timeout, bool) or not isinstance(timeout, (int, float)) or not timeout > 0):
         raise InputError(f"timeout is {timeout!r}; give a number of seconds above 0, or None.")
@@ -280,6 +282,8 @@ def minimize(f: Callable[[Any], float], box: Box, n_trials: int = 100, **setting
     >>> bool(abs(result.recommendation.x[0] - 0.5) < 0.01), bool(result.recommendation.mean < 0.001)
     (True, True)
     """
+    if settings.get("direction", "minimize") != "minimize":
+        raise InputError(f"direction is {settings['direction']!r}, but minimize minimizes; leave it out.")
     turned: dict[str, Any] = {**settings, "direction": "minimize"}
     return maximize(f, box, n_trials, **turned)
 

@@ -186,7 +186,9 @@ def _choice(name: str, choices: tuple[Any, ...]) -> Choice:
 def _number(name: str, lower: float, upper: float, words: list[str]) -> Number:
     if not (np.isfinite(lower) and np.isfinite(upper)):
         raise InputError(f"bounds of '{name}' are ({lower}, {upper}); both must be finite numbers.")
-    if not lower < upper or not np.isfinite(upper - lower):
+    if lower < upper and not np.isfinite(upper - lower):
+        raise InputError(f"bounds of '{name}' are ({lower}, {upper}); they are too far apart for a computer's numbers.")
+    if not lower < upper:
         raise InputError(
             f"bounds of '{name}' are ({lower}, {upper}); lower must be smaller than upper: swap or widen them."
         )

@@ -100,8 +100,12 @@ def robust_score(
     Raises
     ------
     InputError
-        If n is not a positive integer, x lies outside the box, or the noise does not fit the box.
+        If the problem has no box, n is not a positive integer, x lies outside the box, or the noise does not fit it.
     """
+    if not isinstance(getattr(problem, "box", None), Box):
+        raise InputError(
+            f"problem is {problem!r}, which has no box; give a problem, such as surehold.problems.Function(f, box)."
+        )
     border = "extend" if getattr(problem, "border", "keep") == "extend" else "keep"
     points = perturbed_points(x, problem.box, noise, n, seed, border)
     outcomes = np.empty(len(points))

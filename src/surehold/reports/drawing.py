@@ -200,7 +200,8 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
     axes.plot(t, view.mean, color=PALETTE["ink"], linewidth=1.2, label="model (mean ± 2 standard deviations)")
     if view.robust_mean is not None:
         axes.plot(t, view.robust_mean, color=PALETTE["answer"], linewidth=2.0, label="averaged over the input noise")
-    ok = marked(report, view)["trials-told"]
+    marks = marked(report, view)
+    ok, failed = marks["trials-told"], marks["trials-failed"] & report.failed
     told = {"s": 12, "color": PALETTE["muted"], "gid": "trials-told", "label": "trials", "zorder": 2.5}
     axes.scatter(variable.shown(report.X[ok, i]), report.y[ok], **told)
     for candidate in report.candidates:
@@ -222,6 +223,10 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
         )
     everything = np.concatenate([view.mean, report.y[ok]])
     margin = 0.25 * (everything.max() - everything.min()) or 1.0
+    if failed.any():  # which have no height
+        bottom = _SHARES[0] if report.counted else everything.min() - margin
+        crosses = {"s": 28, "color": PALETTE["high"], "marker": "x", "gid": "trials-failed", "clip_on": False}
+        axes.scatter(variable.shown(report.X[failed, i]), np.full(failed.sum(), bottom), label="failed", **crosses)
     set_scale(axes, "x", (t[0], t[-1]), log=variable.log, whole=variable.whole)
     axes.set(xlabel=variable.label, ylabel=report.axis_name)
     axes.set_ylim(_SHARES if report.counted else (everything.min() - margin, everything.max() + margin))

@@ -83,7 +83,8 @@ def checked_folder(folder: str | Path) -> Path:
             pass
     except OSError as error:
         raise InputError(
-            f"output folder '{path}' cannot be written ({error.strerror or error}); choose another (--out)."
+            f"output folder '{path}' cannot be written ({error.strerror or error}); choose another, on the command "
+            "line with --out."
         ) from None
     return path
 

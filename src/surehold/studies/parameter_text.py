@@ -13,7 +13,7 @@ from surehold.studies.search_space import SearchSpace
 
 __all__ = ["parse_assignments", "parse_search_space"]
 
-_FORM = "write NAME=LOWER:UPPER, with :log, :int or :step=0.5 behind it where wanted, or NAME=THIS|THAT"
+_FORM = "write NAME=LOWER:UPPER, with :log, :int or :step=0.5 behind it where wanted, or NAME=this/that"
 
 
 def parse_search_space(text: str) -> SearchSpace:

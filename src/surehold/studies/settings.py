@@ -5,6 +5,7 @@ Written into the study when it is created; whoever opens the study later works w
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from inspect import signature
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,6 +15,7 @@ from optuna.study import Study
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.optimizer import Optimizer
 from surehold.studies.sampler import Sampler
 from surehold.studies.search_space import SearchSpace
 
@@ -50,6 +52,10 @@ class StudySettings:
         object.__setattr__(self, "problem", _found_from_anywhere(self.problem))
         if isinstance(self.optimizer.get("risk"), str):  # a name, which is a measure with its usual parameter
             object.__setattr__(self, "optimizer", {**self.optimizer, "risk": Risk(self.optimizer["risk"])})
+        known = [name for name in signature(Optimizer).parameters if name not in ("box", "direction", "input_noise")]
+        for name in self.optimizer:
+            if name not in known:
+                raise unknown_name("setting of an optimizer", name, known)
         _noise_to_json(self.input_noise, self.space)
         for name in self.units:
             if name not in self.space.distributions:

@@ -187,6 +187,8 @@ def test_many_draws_at_once_are_measured_one_by_one(name):
         ({"name": "var", "alpha": float("nan")}, "between 0 and 1"),
         ({"name": "mean-std", "beta": -1.0}, "0 or more"),
         ({"name": "mean-std", "beta": float("inf")}, "finite"),
+        ({"name": "cvar", "alpha": "x"}, "alpha is 'x'; give a number"),
+        ({"name": "mean-std", "beta": None}, "beta is None; give a number"),
     ],
 )
 def test_bad_input(arguments, message):
@@ -253,13 +255,12 @@ def test_linear_function_under_uniform_noise(known, alpha):
 # --- of a model that is not -----------------------------------------------------------------------------------------
 
 
-def many_values(posterior, perturbations, risk, U, times=800):
-    """Return independent draws (k, q): one of each pair of mirror images."""
+def many_values(posterior, perturbations, risk, U, times=400):
     parts = [
         RiskImprovement(posterior, perturbations, risk, 0.0, np.random.default_rng(seed)).values(U)
         for seed in range(times)
     ]
-    return np.concatenate([part[:, : part.shape[1] // 2].reshape(-1, len(U)) for part in parts])
+    return np.concatenate(parts)
 
 
 def test_draws_of_the_mean_have_the_moments_of_the_outcome(unsure):
@@ -298,40 +299,13 @@ def test_improvement_over_what_is_known(known):
     U = np.array([[0.4, 0.5], [0.9, 0.2]])
     spread = np.sqrt(SLOPE @ S @ SLOPE)
     cvar = linear(U) - spread * stats.norm.pdf(stats.norm.ppf(0.2)) / 0.2
-    best, lacking = float(cvar.mean()), float(cvar.min()) - 1.0
+    best = float(cvar.mean())
     improvement = RiskImprovement(known, perturbations, Risk("cvar", 0.2), best, np.random.default_rng(0))
     np.testing.assert_allclose(improvement.expectation(U), cvar, atol=0.02 * spread)
-    np.testing.assert_allclose(improvement(U), np.maximum(cvar - best, 0.0), atol=0.02 * spread)
-    sure = RiskImprovement(known, perturbations, Risk("cvar", 0.2), lacking, np.random.default_rng(0), margin=0.25)
-    np.testing.assert_allclose(sure(U), cvar - lacking - 0.25, atol=0.02 * spread)
-    value, gradient = sure.with_gradient(U)
-    np.testing.assert_array_equal(value, sure(U))
+    np.testing.assert_allclose(improvement(U), cvar - best, atol=0.02 * spread)
+    value, gradient = improvement.with_gradient(U)
+    np.testing.assert_array_equal(value, improvement(U))
     np.testing.assert_allclose(gradient, np.tile(SLOPE, (2, 1)), atol=1e-3)
-
-
-def test_the_mean_of_the_draws_is_exact(unsure):
-    perturbations, U = Perturbations(quasi_monte_carlo(S, 5)), np.random.default_rng(4).random((6, 2))
-    improvement = RiskImprovement(unsure, perturbations, Risk(), None, np.random.default_rng(0))
-    np.testing.assert_allclose(improvement(U), perturbations.outcome(unsure, U).mean.mean(axis=0), atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("name", "skew"), [("mean", 0.02), ("mean-std", 0.06), ("mean-variance", 0.06), ("var", 0.06), ("cvar", 0.06)]
-)
-def test_improvement_of_an_unsure_model_against_many_draws(unsure, name, skew):
-    """Averaged over the random numbers, it is what 12,800 draws gain, up to how far they are from a normal variable."""
-    perturbations, risk = Perturbations(quasi_monte_carlo(S, 4)), Risk(name, 0.25)
-    U = np.array([[0.9, 0.1], [0.3, 0.6]])
-    rho = many_values(unsure, perturbations, risk, U, 1600)
-    best = float(rho.mean(axis=0).max() + 0.5 * rho.std(axis=0).max())
-    found = np.mean(
-        [RiskImprovement(unsure, perturbations, risk, best, np.random.default_rng(seed))(U) for seed in range(400)],
-        axis=0,
-    )
-    gains = np.maximum(rho - best, 0.0).mean(axis=0)
-    np.testing.assert_allclose(found, gains, atol=skew * float(rho.std(axis=0).max()))
-    high = float(rho.max() + 2.0 * rho.std(axis=0).max())
-    assert np.all(RiskImprovement(unsure, perturbations, risk, high, np.random.default_rng(0))(U) > 0.0)
 
 
 @pytest.mark.parametrize("name", ["mean-variance", "mean-std", "var", "cvar"])
@@ -369,7 +343,7 @@ def test_the_correction_of_an_unsure_model_against_joint_draws_at_all_points(uns
     """It comes nearer to what 256 perturbations give with as many normal variables, on average over the box."""
     few, many = (Perturbations(quasi_monte_carlo(S, exponent)) for exponent in (3, 8))
     U, risk, rng = np.random.default_rng(3).random((25, 2)), Risk(name, beta=2.0), np.random.default_rng
-    drawn, alone = (many_values(unsure, points, risk, U, 80).mean(axis=0) for points in (many, few))
+    drawn, alone = (many_values(unsure, points, risk, U, 40).mean(axis=0) for points in (many, few))
     corrected = [RiskImprovement(unsure, few, risk, None, rng(k)).corrected(many).expectation(U) for k in range(40)]
     left, off = (np.abs(values - drawn).mean() for values in (np.mean(corrected, axis=0), alone))
     assert left < 0.95 * off
@@ -431,7 +405,7 @@ def test_the_best_place_under_the_worst_case_is_among_the_trials():
 def test_the_measure_decides_where_to_go(name, surrogate):
     """Under N(0, 0.05^2) the steep hill gives 0.77 on average, 0.22 in the worst tenth; the broad one 0.63 and 0.57.
 
-    The steep one's variance is 0.07, its mean less that 0.69.
+    The steep one's variance is 0.074: less three times that it is 0.54.
     """
 
     def f(x):
@@ -439,10 +413,9 @@ def test_the_measure_decides_where_to_go(name, surrogate):
         return float(steep + 0.65 * np.exp(-0.5 * ((x[0] - 0.7) / 0.2) ** 2))
 
     noise = sh.InputNoise.unit(0.05)
-    optimizer = sh.Optimizer(sh.Box.unit(1), input_noise=noise, risk=name, surrogate=surrogate, n_initial=8, seed=0)
+    risk = sh.Risk(name, beta=3.0 if name == "mean-variance" else 1.0)
+    optimizer = sh.Optimizer(sh.Box.unit(1), input_noise=noise, risk=risk, surrogate=surrogate, n_initial=8, seed=0)
     for _ in range(18):
         x = optimizer.ask()
         optimizer.tell(x, f(x))
-    assert float(optimizer.recommend().x[0]) == pytest.approx(
-        0.25 if name in ("mean", "mean-variance") else 0.7, abs=0.05
-    )
+    assert float(optimizer.recommend().x[0]) == pytest.approx(0.25 if name == "mean" else 0.7, abs=0.05)

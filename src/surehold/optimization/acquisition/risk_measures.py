@@ -7,11 +7,11 @@ Legend
     alpha     share of the worst outcomes that counts, in (0, 1)
     beta      standard deviations or variances taken off the mean
     kappa     of the worst case: standard deviations added to and taken off the model's mean
-    m, b      particles, draws of each
 """
 
 from copy import copy
 from dataclasses import dataclass
+from numbers import Real
 from typing import Final
 
 import numpy as np
@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from surehold.defaults import RISK_DRAWS
 from surehold.errors import InputError, unknown_name
-from surehold.optimization.acquisition.criteria import expected_improvement
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.numerics.differences import by_differences
 from surehold.optimization.surrogates.protocol import Posterior, means, mixture
@@ -47,6 +46,9 @@ class Risk:
     def __post_init__(self) -> None:
         if self.name not in RISKS:
             raise unknown_name("risk", self.name, RISKS)
+        for name, value in (("alpha", self.alpha), ("beta", self.beta)):
+            if isinstance(value, bool) or not isinstance(value, Real):
+                raise InputError(f"{name} is {value!r}; give a number.")
         if not 0.0 < self.alpha < 1.0:
             raise InputError(f"alpha is {self.alpha!r}; give the share of worst outcomes, strictly between 0 and 1.")
         if not (np.isfinite(self.beta) and self.beta >= 0.0):
@@ -138,20 +140,14 @@ class Risk:
 class RiskImprovement:
     """Expected improvement of a risk measure, by joint draws of the posterior around each query.
 
-    Under each particle the measure is taken for a normal variable with the mean and the standard deviation of its
-    draws: where none of them improves, the formula still tells which place is the likelier to, and is smooth.
-
     Parameters
     ----------
     posterior, perturbations, risk
         The surrogate, the input noise, what is asked of the outcome.
     best
-        Value to improve upon, a number, or (m, 1) for one per particle; None for the expected measure itself.
+        Value to improve upon; None for the expected measure itself.
     rng
-        For the common random numbers of the draws. They come in pairs, one the mirror image of the other about the
-        model's mean, so that the average of the measure "mean" is exact.
-    margin
-        Improvement that does not count, in the outputs' units.
+        For the common random numbers of the draws.
     """
 
     def __init__(
@@ -159,18 +155,15 @@ class RiskImprovement:
         posterior: Posterior,
         perturbations: Perturbations,
         risk: Risk,
-        best: float | NDArray[np.float64] | None,
+        best: float | None,
         rng: np.random.Generator,
-        margin: float = 0.0,
     ):
         self._posterior = posterior
         self._perturbations = perturbations
         self._finer: Perturbations | None = None
         self._risk = risk
         self._best = best
-        self._margin = margin
-        half = rng.standard_normal((RISK_DRAWS // 2, len(perturbations.quadrature.weights)))
-        self._normals = np.concatenate([half, -half])
+        self._normals = rng.standard_normal((RISK_DRAWS, len(perturbations.quadrature.weights)))
 
     def corrected(self, finer: Perturbations | None) -> "RiskImprovement":
         """Return the improvement of the measure by more perturbations of the same noise, of the same draws.
@@ -183,35 +176,39 @@ class RiskImprovement:
         other._finer = finer
         return other
 
-    def over(self, points: NDArray[np.float64]) -> "RiskImprovement":
-        """Return the improvement upon the best of the points (q, d), by the same draws, particle by particle."""
+    def mirrored(self) -> "RiskImprovement":
+        """Return the improvement by these draws and their mirror images about the mean, whose mean is exact."""
         other = copy(self)
-        by_particle = self.values(points).mean(axis=1)
-        best = int(np.argmax(by_particle.mean(axis=0)))
-        other._best = by_particle[:, best : best + 1]
+        other._normals = np.concatenate([self._normals, -self._normals])
+        return other
+
+    def over(self, points: NDArray[np.float64]) -> "RiskImprovement":
+        """Return the improvement upon the best of the points (q, d), by the same draws."""
+        other = copy(self)
+        other._best = float(self.expectation(points).max())
         return other
 
     def values(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return draws of the risk measure (m, b, q) at U (q, d)."""
+        """Return draws of the risk measure (m b, q) at U (q, d)."""
         draws = self._posterior.sample(self._perturbations.around(U), self._normals)  # (m, q, b, s)
         rho = self._risk.measure(draws, self._perturbations.quadrature.weights)
         if self._finer is not None:
             few, many = self._of_mean(self._perturbations, U), self._of_mean(self._finer, U)
             sound = np.isfinite(few) & np.isfinite(many)  # a variance of huge values is infinite
             rho += np.subtract(many, few, out=np.zeros_like(few), where=sound)[:, :, None]
-        return np.swapaxes(rho, 1, 2)
+        return np.swapaxes(rho, 1, 2).reshape(-1, len(U))
 
     def expectation(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the expected risk measure (q,) at U (q, d)."""
-        return self.values(U).mean(axis=(0, 1))
+        return self.values(U).mean(axis=0)
 
     def __call__(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the expected improvement (q,) at U (q, d), or the expected measure where there is no `best`."""
-        if self._best is None:
-            return self.expectation(U)
+        """Return the expected improvement (q,); where no draw improves, how near the best one comes (negative)."""
         rho = self.values(U)
-        gain = expected_improvement(rho.mean(axis=1), rho.std(axis=1, ddof=1), self._best, self._margin)
-        return gain.value.mean(axis=0)
+        if self._best is None:
+            return rho.mean(axis=0)
+        gain = np.maximum(rho - self._best, 0.0).mean(axis=0)
+        return np.where(gain > 0.0, gain, np.minimum(rho.max(axis=0) - self._best, 0.0))
 
     def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return values (q,) and gradients (q, d) at U (q, d), by central differences on common random numbers."""

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import SCREENING_DIVISOR
+from surehold.defaults import MARGIN, MARGIN_UNDER_NOISE, POLISH_PERIOD, SCREENING_DIVISOR
 from surehold.optimization.acquisition.scales import Acquisition, CriterionName
 from surehold.optimization.acquisition.where_to_look import where_to_look
 from surehold.optimization.maximizer.multistart import multistart
@@ -47,7 +47,7 @@ class ExpectedImprovement:
         if self.trust_region is not None:
             regions = self.trust_region.within(regions, anchors[0], history.observed)
         d = anchors.shape[1]
-        margin = ranking.margin(history, scale)
+        margin = self._margin(history)
         accurate, coarse = (Perturbations(exact(d)),) * 2 if scale == "exact" else (ranking.accurate, ranking.coarse)
         found = multistart(
             Acquisition(posterior, self.criterion, accurate, best, margin=margin, kappa=self.kappa),
@@ -70,3 +70,10 @@ class ExpectedImprovement:
         if scale == "robust":
             found = np.concatenate([where_to_look(posterior, found[0], accurate, coarse), found])
         return found
+
+    def _margin(self, history: History) -> float:
+        """Return the improvement that does not count, in the outputs' units."""
+        polish = history.told % POLISH_PERIOD == 0 and not len(history.pending)
+        if self.ranking.noisy or polish:
+            return 0.0
+        return (MARGIN if self.criterion.scale == "exact" else MARGIN_UNDER_NOISE) * history.spread

@@ -14,15 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import (
-    ANCHORS,
-    CONTENDERS,
-    MARGIN,
-    MARGIN_UNDER_NOISE,
-    POLISH_PERIOD,
-    SCREENING_DIVISOR,
-    SHORTLIST,
-)
+from surehold.defaults import ANCHORS, CONTENDERS, SCREENING_DIVISOR, SHORTLIST
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
 from surehold.optimization.acquisition.scales import Acquisition, CriterionName, Scale
 from surehold.optimization.constraints.admission import Admission
@@ -162,21 +154,10 @@ class Ranking:
         return self._expected(posterior.thinned(SCREENING_DIVISOR)).corrected(finer).expectation(U)
 
     def worth(self, posterior: Posterior, U: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what is stated of U (q, d): as `measure`, of all particles, (q,)."""
+        """Return what is stated of U (q, d): as `measure`, of all particles and of draws whose mean is exact, (q,)."""
         if self.risk.name == "mean":
             return self.measure(posterior, U)
-        return self._expected(posterior).corrected(self.correction(posterior)).expectation(U)
-
-    def margin(self, history: History, scale: Scale) -> float:
-        """Return the improvement that does not count, in the outputs' units.
-
-        Any counts on every third trial; under a risk measure on the one before that, too.
-        """
-        turns = (0,) if self.risk.name == "mean" else (0, POLISH_PERIOD - 1)
-        polish = history.told % POLISH_PERIOD in turns and not len(history.pending)
-        if self.noisy or polish:
-            return 0.0
-        return (MARGIN if scale == "exact" else MARGIN_UNDER_NOISE) * history.spread
+        return self._expected(posterior).mirrored().corrected(self.correction(posterior)).expectation(U)
 
     def judged(
         self, posterior: Posterior, one: NDArray[np.float64], other: NDArray[np.float64]

@@ -47,9 +47,7 @@ class RiskAverse:
                 return found
             return np.concatenate([bound.to_try(found[0]), found])
         some = posterior.thinned(SCREENING_DIVISOR)
-        found, _ = most_improving(
-            self.ranking, some, best, finer, history, rng, regions, self.ranking.margin(history, "robust")
-        )
+        found, _ = most_improving(self.ranking, some, best, finer, history, rng, regions)
         if not len(found):
             return found
         return np.concatenate([where_to_look(posterior, found[0], accurate, self.ranking.coarse), found])
@@ -63,7 +61,6 @@ def most_improving(
     history: History,
     rng: np.random.Generator,
     regions: Regions,
-    margin: float = 0.0,
 ) -> tuple[NDArray[np.float64], float]:
     """Return points of the cube (c, d), the one first that improves a risk measure most, and what it is expected to.
 
@@ -79,10 +76,8 @@ def most_improving(
         The best tried inputs, best first.
     finer
         Perturbations that correct the measure; None: nothing does.
-    margin
-        Improvement that does not count, in the outputs' units.
     """
-    measure = RiskImprovement(posterior, ranking.accurate, ranking.risk, None, rng, margin)
+    measure = RiskImprovement(posterior, ranking.accurate, ranking.risk, None, rng)
     known = np.concatenate([best, history.pending])
     improvement, admission = measure.over(known), history.admission
     found = multistart(improvement, improvement, best.shape[1], best[:ANCHORS], rng, regions, admission)
