@@ -429,6 +429,19 @@ def test_choices_need_no_quotes(capsys):
     assert json.loads(capsys.readouterr().out)["parameters"]["grip"]["attributes"]["choices"] == ["a/b", "c"]
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("create rig --parameters x=0:1 --risk cvar=0.1 --noise none", "--risk cvar=0.1 is of the outcome"),
+        ("create rig --parameters x=0:1,y=0:1:log", "or NAME=this/that"),
+        ("work rig --trials 0", "--trials is 0; give 1 or more"),
+    ],
+)
+def test_what_cannot_be_is_said_in_words_of_the_command(line, words, capsys):
+    assert run(["study", *line.split()]) == 2
+    assert words in " ".join(capsys.readouterr().err.split())
+
+
 def test_counts_of_successes(study, capsys):
     study("create rig --parameters x=0:1 --outcome success")
     study("ask rig")

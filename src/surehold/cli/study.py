@@ -86,6 +86,7 @@ def create(
 ) -> None:
     """Create a study."""
     from surehold.cli.options import limits_given, noise_of, risk_of
+    from surehold.errors import InputError
     from surehold.studies.parameter_text import parse_assignments
     from surehold.studies.robot import RobotStudy
     from surehold.studies.settings import StudySettings
@@ -102,6 +103,8 @@ def create(
     input_noise = None if noise.strip().lower() == "none" else noise_of(noise, "bo")
     if space.box is None or space.box.numbers is None:
         input_noise = None  # choices carry none
+    if input_noise is None and "risk" in optimizer:
+        raise InputError(f"--risk {risk} is of the outcome under input noise, and there is none; give --noise.")
     settings = StudySettings(
         space, input_noise, parse_assignments(units, "--units") if units else {}, optimizer, described, direction
     )

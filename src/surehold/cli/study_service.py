@@ -37,9 +37,12 @@ def work(
     from surehold.cli.compilation import announced
     from surehold.cli.interruption import terminable
     from surehold.cli.terminal import terminal
+    from surehold.errors import InputError
     from surehold.studies.trial_function import problem_of, trial_function
     from surehold.studies.worker import work as work_on
 
+    if trials is not None and trials < 1:
+        raise InputError(f"--trials is {trials}; give 1 or more, or leave it out.")
     study = opened(name, storage)
     console = terminal()
 

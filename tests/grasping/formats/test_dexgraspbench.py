@@ -84,8 +84,12 @@ def test_a_folder_is_read_in_order_and_holds_one_object(tmp_path):
     with pytest.raises(InputError, match="made with different options"):
         read_grasps(tmp_path)
     assert read_grasps(tmp_path / "11.npy").settings == {"friction": 0.7}
-    with pytest.raises(InputError, match=r"holds 0 \.npy files"):
+    with pytest.raises(InputError, match=r"holds 0 \.npy files; give a folder of 1 to [0-9,]+\."):
         read_grasps((tmp_path / "empty").mkdir() or tmp_path / "empty")
+    (tmp_path / "upper" / "grasps").mkdir(parents=True)
+    written(tmp_path / "upper" / "grasps" / "0.npy")
+    with pytest.raises(InputError, match=r"such as '.*grasps'"):
+        read_grasps(tmp_path / "upper")
 
 
 class Hostile:

@@ -93,7 +93,11 @@ def read_dexgraspbench_grasps(path: str | Path, joints: Sequence[str] = ()) -> G
     if place.is_dir():
         files = sorted(place.glob("*.npy"), key=lambda file: (len(file.stem) if file.stem.isdigit() else 99, file.stem))
         if not files or len(files) > _MOST_FILES:
-            raise InputError(f"{str(path)!r} holds {len(files):,} .npy files; give a folder of 1 to {_MOST_FILES:,}.")
+            inside = sorted(folder for folder in place.iterdir() if folder.is_dir() and any(folder.glob("*.npy")))
+            such = f", such as {str(inside[0])!r}" if inside else ""
+            raise InputError(
+                f"{str(path)!r} holds {len(files):,} .npy files; give a folder of 1 to {_MOST_FILES:,}{such}."
+            )
     rows = [(file, _row(file)) for file in files]
     paths = {(row.get("obj_path"), number(row.get("obj_scale", 1.0), f"{str(f)!r}: obj_scale")) for f, row in rows}
     if len(paths) > 1:
