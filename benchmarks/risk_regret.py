@@ -76,9 +76,8 @@ def main():
         paired = f"{gap.mean():+.2f} ({gap.std(ddof=1) / np.sqrt(len(gap)):.2f})"
         won, lost = ((within[:, k] & ~within[:, 1 - k]).sum() for k in (0, 1))
         print(f"{name or 'all':14}{len(gap):4}  {means}, {paired}; within 1 %:", *within.sum(axis=0), end="")
-        print(
-            f", won {won}, lost {lost}; {seconds[:, 0].mean():.1f} s, {seconds[:, 1].mean():.1f} s; again {again.mean():.1f}"
-        )
+        took = " s, ".join(f"{mean:.1f}" for mean in seconds.mean(axis=0))
+        print(f", won {won}, lost {lost}; {took} s; again {again.mean():.1f}")
 
 
 if __name__ == "__main__":
