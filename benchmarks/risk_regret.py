@@ -66,7 +66,10 @@ def main():
     rows = Parallel(n_jobs=2)(delayed(compared)(seed) for seed in averse(parser.parse_args().count))
     print(file=sys.stderr)
     for name in ("mean-variance", "var", "cvar", ""):
-        regrets, seconds, again = (np.array([row[k] for row in rows if name in ("", row[0])]) for k in (1, 2, 3))
+        those = [row for row in rows if name in ("", row[0])]
+        if len(those) < 2:
+            continue
+        regrets, seconds, again = (np.array([row[k] for row in those]) for k in (1, 2, 3))
         error = regrets.std(axis=0, ddof=1) / np.sqrt(len(regrets))
         gap = regrets[:, 0] - regrets[:, 1]
         within = regrets <= 1.0
