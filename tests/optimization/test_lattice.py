@@ -110,3 +110,13 @@ def test_of_allowed_places_each_is_tried_once():
         tried.append(tuple(trial.parameters.values()))
         optimizer.tell(trial.parameters, float(tried[-1][0]))
     assert sorted(tried) == [(n, m) for n in range(1, 4) for m in range(1, 5 - n)]
+
+
+def test_a_design_larger_than_the_lattice_repeats_what_it_must():
+    optimizer = Optimizer(Box({"n": (1, 3, "int")}), n_initial=2000, seed=0)
+    tried = []
+    for _ in range(5):
+        trial = optimizer.ask_trial()
+        tried.append(trial.parameters["n"])
+        optimizer.tell(trial.parameters, 0.0)
+    assert sorted(tried[:3]) == [1, 2, 3]

@@ -171,3 +171,16 @@ def test_shares_are_drawn_from_0_to_1(rkhs_report, values):
     assert line.get_ylabel() == trace.get_ylabel() == "share of executions that succeed"
     told = {round(bar.get_x() + bar.get_width() / 2, 9): bar.get_height() for bar in histogram.patches}
     assert (told[0.0], told[1.0]) == (np.sum(values == 0.0), np.sum(values == 1.0))
+
+
+def test_trials_without_a_value_are_crosses_in_a_figure_of_one_variable(rkhs_report):
+    y = rkhs_report.y.copy()
+    y[[2, 5]] = np.nan
+    broken = replace(rkhs_report, y=y)
+    name = next(name for name in figures.figures(broken) if name.startswith("surface"))
+    crosses = [f"trial {i}" for i in np.flatnonzero(marked(broken, broken.surfaces[0])["trials-without-value"])]
+    drawing = figures.svg_text(figures.figures(broken)[name], name)
+    text = figures.inline_svg(drawing, name, "model", {"trials-without-value": crosses})
+    assert crosses == ["trial 2", "trial 5"]
+    assert text.count("<title>trial ") == 2
+    assert "trials-without-value" not in figures.svg_text(figures.figures(rkhs_report)[name], name)

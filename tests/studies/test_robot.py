@@ -610,3 +610,8 @@ def test_what_is_recommended_can_be_commanded(robot):
     assert robot.recommend().parameters == pytest.approx({"dx": 0.05, "dy": 0.01})
     robot.tell(robot.ask().id, 0.5)
     assert abs(robot.recommend().parameters["dx"]) <= 0.05
+
+
+def test_settings_that_no_optimizer_has_are_refused_when_the_study_is_described():
+    with pytest.raises(InputError, match="setting of an optimizer 'sed' is unknown; did you mean 'seed'"):
+        StudySettings(SearchSpace(BOX), None, {}, {"sed": 0})

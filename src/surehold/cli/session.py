@@ -28,7 +28,7 @@ from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.perturbation import RobustScore
 from surehold.problems.problem import Problem
 from surehold.reports import files, gather, page
-from surehold.reports.run_report import Candidate, RunReport
+from surehold.reports.run_report import Candidate, RunReport, Surface
 from surehold.reports.verdict import verdict
 from surehold.reports.wording import number
 from surehold.store.atomic import checked_folder
@@ -162,7 +162,11 @@ def run_session(
         if result.interrupted:
             console.print(f"Interrupted after {len(result.y)} of {amount(trials, 'trial')}; keeping what was done.")
 
-        def reported(scores: Mapping[tuple[str, int], RobustScore | None], missing: list[str]) -> RunReport:
+        def reported(
+            scores: Mapping[tuple[str, int], RobustScore | None],
+            missing: list[str],
+            surfaces: tuple[Surface, ...] | None = None,
+        ) -> RunReport:
             return gather.report_of(
                 result,
                 [describe(gather.candidate(result, label, i, score)) for (label, i), score in scores.items()],
@@ -185,18 +189,23 @@ def run_session(
                 success_above=success_above,
                 outcomes={} if _any_above(result, success_above) else outcomes(result),
                 advice=advice,
+                surfaces=surfaces,
             )
 
-        shown: dict[tuple[str, int], RobustScore | None] = dict.fromkeys(gather.answers(result).items())
-        missing: list[str] = []
-        if noise is not None and requeries and ended:
-            missing = ["The run was ended from outside; nothing was queried again."]
-        elif noise is not None and requeries:
-            with undisturbed(console):  # what follows may take as long as the trials did
-                files.write_result(reported(shown, ["The re-queries were not finished."]), folder)
-            shown, missing = requeried(problem, result, noise, requeries, seed, shown, console)
+        shown = gather.answers(result).items()
+        asked = None if ended or not requeries else noise
+        unasked = ["The run was ended from outside; nothing was queried again."]
         with undisturbed(console):
-            report = reported(shown, missing)
+            report = reported(dict.fromkeys(shown), unasked * bool(ended and requeries and noise is not None))
+            if asked is not None:  # what follows may take as long as the trials did
+                files.write_result(report, folder)
+        scores: dict[tuple[str, int], RobustScore | None] = {}
+        missing: list[str] = []
+        if asked is not None:
+            scores, missing = requeried(problem, result, asked, requeries, seed, shown, console)
+        with undisturbed(console):
+            if scores:
+                report = reported(scores, missing, report.surfaces)
             with listed_writes(folder, replacing=True) as removed:
                 path = files.write_run(report, folder)
                 also_write(report, folder)

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions, means
-from surehold.optimization.trials import same
 
 Allowed = Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None
 
-_POOL: Final = 1024  # random points among which one is sought that has not been tried
+_SOME: Final = 1024  # random points among which one is sought that has not been tried
 
 __all__ = ["Lattice", "LatticePosterior", "lattice_of"]
 
@@ -39,20 +38,29 @@ class Lattice:
         """Return points (n, d), each replaced that is the same trial as one `before` (k, d) or in an earlier row."""
         if self.smooth.any():  # no two random points are the same trial
             return points
-        made = list(self.snap(before))
+        known, others, found = {_key(point) for point in self.snap(before)}, iter(self._some(rng, allowed)), []
         for point in self.snap(points):
-            again = len(made) > 0 and bool(same(point, np.array(made)).any())
-            other = self.untried(np.array(made), rng, allowed) if again else None
-            made.append(point if other is None else other)
-        return np.array(made[len(before) :])
+            if _key(point) in known:
+                point = next((other for other in others if _key(other) not in known), point)
+            known.add(_key(point))
+            found.append(point)
+        return np.array(found)
 
     def untried(
         self, tried: NDArray[np.float64], rng: np.random.Generator, allowed: Allowed
     ) -> NDArray[np.float64] | None:
         """Return an allowed point (d,) that is none of those tried (t, d); None where a random search finds none."""
-        pool = self.snap(rng.random((_POOL, len(self.smooth))))
-        pool = pool if allowed is None else pool[allowed(pool)]
-        return next((point for point in pool if not same(point, tried).any()), None)
+        known = {_key(point) for point in self.snap(tried)}
+        return next((point for point in self._some(rng, allowed) if _key(point) not in known), None)
+
+    def _some(self, rng: np.random.Generator, allowed: Allowed) -> NDArray[np.float64]:
+        points = self.snap(rng.random((_SOME, len(self.smooth))))
+        return points if allowed is None else points[allowed(points)]
+
+
+def _key(point: NDArray[np.float64]) -> bytes:
+    """Return what is equal for points of a lattice that are the same: snapped, they are so to the last bit."""
+    return (point + 0.0).tobytes()  # -0.0 is 0.0
 
 
 def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | None:

@@ -247,7 +247,7 @@ class Requirements:
                 return f"{start}only {share:.0%} of its executions are expected to succeed."
         share = float(self.probability(trials, trials.places[k : k + 1])[0])
         if share >= self.level:
-            few = f"too few to be sure of the {self.level:.0%} asked for"
+            few = f"too few to be sure of the {100.0 * self.level:.4g}% asked for"
             return f"{start}{share:.1%} of its executions are expected to keep all limits, {few}."
         return f"{start}only {share:.0%} of its executions are expected to keep all limits."
 

@@ -70,8 +70,13 @@ def marked(report: RunReport, view: Surface | None = None) -> dict[str, np.ndarr
         for variable, axis in zip(view.variables, view.axes, strict=True):
             inside &= (report.X[:, variable] >= axis[0]) & (report.X[:, variable] <= axis[-1])
     ok, told = inside & ~report.lost, inside & ~report.failed
-    lost = inside & report.lost
-    return {"trials-initial": ok & initial, "trials-later": ok & ~initial, "trials-failed": lost, "trials-told": told}
+    return {
+        "trials-initial": ok & initial,
+        "trials-later": ok & ~initial,
+        "trials-failed": inside & report.lost,
+        "trials-told": told,
+        "trials-without-value": inside & report.failed,
+    }
 
 
 def draw_shake(axes: "Axes", report: RunReport, candidate: Candidate) -> None:
@@ -201,7 +206,7 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
     if view.robust_mean is not None:
         axes.plot(t, view.robust_mean, color=PALETTE["answer"], linewidth=2.0, label="averaged over the input noise")
     marks = marked(report, view)
-    ok, failed = marks["trials-told"], marks["trials-failed"] & report.failed
+    ok, failed = marks["trials-told"], marks["trials-without-value"]
     told = {"s": 12, "color": PALETTE["muted"], "gid": "trials-told", "label": "trials", "zorder": 2.5}
     axes.scatter(variable.shown(report.X[ok, i]), report.y[ok], **told)
     for candidate in report.candidates:
@@ -225,7 +230,7 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
     margin = 0.25 * (everything.max() - everything.min()) or 1.0
     if failed.any():  # which have no height
         bottom = _SHARES[0] if report.counted else everything.min() - margin
-        crosses = {"s": 28, "color": PALETTE["high"], "marker": "x", "gid": "trials-failed", "clip_on": False}
+        crosses = {"s": 28, "color": PALETTE["high"], "marker": "x", "gid": "trials-without-value", "clip_on": False}
         axes.scatter(variable.shown(report.X[failed, i]), np.full(failed.sum(), bottom), label="failed", **crosses)
     set_scale(axes, "x", (t[0], t[-1]), log=variable.log, whole=variable.whole)
     axes.set(xlabel=variable.label, ylabel=report.axis_name)

@@ -21,6 +21,7 @@ from surehold.reports.run_report import (
     RunReport,
     Scene,
     SceneMesh,
+    Surface,
     Variable,
     extreme_of,
 )
@@ -143,6 +144,7 @@ def report_of(
     success_above: float | None = None,
     outcomes: Mapping[str, int] | None = None,
     advice: str = "",
+    surfaces: tuple[Surface, ...] | None = None,
 ) -> RunReport:
     """Return the report of a run: its trials, its candidates, its traces and its model.
 
@@ -161,6 +163,8 @@ def report_of(
     success_above, outcomes, advice
         Of `RunReport`: what counts as a success, and what is said where there was none. Where trials succeed or fail, a
         share above 0 does.
+    surfaces
+        Those of a report of the same trials and places, if there is one: drawing a model takes its time.
 
     Raises
     ------
@@ -215,7 +219,7 @@ def report_of(
         outcomes=outcomes or {},
         advice=advice or _ADVICE * counted,
         infeasible=result.recommendation.infeasible,
-        surfaces=surfaces_of(optimizer, noise, [c.x for c in candidates], shown),
+        surfaces=surfaces_of(optimizer, noise, [c.x for c in candidates], shown) if surfaces is None else surfaces,
         warning=result.recommendation.warning,
         interrupted=result.interrupted,
         planned_trials=planned_trials,
