@@ -77,6 +77,13 @@ def test_an_exploration(here, capsys):
     assert (here / "touched" / "shape.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_an_exploration_without_a_grasp_that_holds_says_so(here, capsys):
+    assert surehold("explore drill --trials 1 --seed 1 --out none") == 3
+    assert "No grasp that holds on the true shape was found; give more --trials." in capsys.readouterr().out
+    assert (here / "none" / "explore.html").exists()
+    assert surehold("explore drill --trials 1 --seed 1 --goal shape --out shape") == 0
+
+
 def test_no_exploration_replaces_another_and_one_that_cannot_start_leaves_nothing(here, capsys, monkeypatch):
     for _ in range(2):
         assert surehold("explore bottle --trials 1") == 0

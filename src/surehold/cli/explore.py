@@ -47,6 +47,7 @@ def explore(
     """Touch an object whose shape is not known, learn it, and end with a grasp: in simulation, or with a robot."""
     from surehold.cli.compilation import announced
     from surehold.cli.folders import folder_of
+    from surehold.cli.session import NO_SUCCESS
     from surehold.cli.terminal import terminal
     from surehold.problems.grasp.exploration import GOALS
 
@@ -98,6 +99,9 @@ def explore(
     console.print(f"Page: {path}", markup=False, soft_wrap=True)
     if open_page:
         webbrowser.open(path.resolve().as_uri())
+    if goal == "grasp" and not run.true > 0.0:
+        console.print("No grasp that holds on the true shape was found; give more --trials.", markup=False)
+        raise typer.Exit(NO_SUCCESS)
 
 
 def _created(study: str, storage: str, described: dict[str, Any], box: str, goal: str, noise: Any, seed: int) -> str:

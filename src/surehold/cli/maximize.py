@@ -129,7 +129,7 @@ def maximize(
             "problem": problem,
             "bounds": bounds or None,
             "input noise": noise_text,
-            "surrogate": surrogate or None,
+            "surrogate": surrogate or "default",
         },
         direction=direction,
         outcome=outcome,

@@ -51,7 +51,10 @@ def evaluate(f: Callable[[Any], Any], x: NDArray[np.float64] | dict[str, Any]) -
         raise_interruption(error)
         if isinstance(error, TypeError) and _in_the_call(error.__traceback__):
             what = f"dictionary of {', '.join(x)}" if isinstance(x, dict) else f"array x of shape {x.shape}"
-            raise InputError(f"the function cannot be called with one {what}: {error}.") from None
+            use = f"x[{next(iter(x))!r}]" if isinstance(x, dict) else "x[0]"
+            raise InputError(
+                f"the function cannot be called with one {what}: {error}; write it as f(x), and use {use}."
+            ) from None
         hint = "" if isinstance(x, dict) or _NOT_ONE_NUMBER not in str(error) else f"; x has shape {x.shape}, take x[0]"
         return np.nan, f"{type(error).__name__}: {error}{hint}", {}
     outputs: Mapping[str, Any] = {}

@@ -106,6 +106,7 @@ def test_variables_without_noise_get_no_points(name):
         (lambda: sigma_points([[1.0, 0.0], [0.5, 1.0]]), "symmetric"),
         (lambda: sigma_points([[1.0, 2.0], [2.0, 1.0]]), "positive definite"),
         (lambda: sigma_points([[np.inf]]), "finite"),
+        (lambda: sigma_points("a"), "'a'; give a finite square matrix"),
         (lambda: scaled_sigma_points(np.eye(2), 0.0), "alpha"),
         (lambda: scaled_sigma_points(np.eye(2), 1.0, -2.0), "kappa"),
         (lambda: central_difference_points(np.eye(2), 0.0), "step"),

@@ -231,7 +231,10 @@ def _star(noisy: NDArray[np.intp], root: NDArray[np.float64], d: int, distance: 
 
 def _root(covariance: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.float64], int]:
     """Return the noisy variables (r,), the lower Cholesky factor of their covariance (r, r), and d."""
-    S = np.array(covariance, dtype=np.float64)
+    try:
+        S = np.array(covariance, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"covariance is {covariance!r}; give a finite square matrix (d, d).") from None
     if S.ndim != 2 or S.shape[0] != S.shape[1] or S.size == 0 or not np.all(np.isfinite(S)):
         raise InputError(f"covariance has shape {S.shape}; give a finite square matrix (d, d).")
     noisy = np.flatnonzero(np.any(S != 0.0, axis=0) | np.any(S != 0.0, axis=1))
