@@ -137,9 +137,9 @@ class Optimizer(Record):
         cannot be reached through safe inputs is never found (after Sui et al. 2015).
     failures
         What a failed trial teaches. "modelled": the response is learnt from the others alone, and a model of where
-        trials succeed multiplies the criterion by that probability. "lowest": it counts as the lowest value told. By
-        default "modelled" for the first 200 trials, of which such a model is cheap, and "lowest" beyond; in the thesis
-        presets "lowest".
+        trials succeed multiplies the criterion by the square of that probability. "lowest": it counts as the lowest
+        value told. By default "modelled" for the first 200 trials, of which such a model is cheap, and "lowest" beyond;
+        in the thesis presets "lowest".
     conditions
         Of a box with uncontrolled variables, while exploring: "commanded" (default), as in a simulator: every trial
         says at which condition it is to be made. "measured", as on a robot: trials are made at whatever comes, and each

@@ -1,7 +1,7 @@
 """Grasping as a problem: pose offsets and posture in, quality of the closed grasp out.
 
-    dx, dy, dz   offsets of the hand along the palm's default axes: along the fingers, towards the index side, towards
-                 the object [m]
+    dx, dy, dz   offsets of the hand along the palm's default axes: along the fingers, across them (of a left hand
+                 towards the index side), towards the object [m]
     rx, ry, rz   turns about the hand's grasp center, R = R_default Rx Ry Rz [rad]
     s1           posture: opposition of the thumb [rad]
     s2, s3       further amplitudes of a synergy that was learned with more than two components [rad]
