@@ -175,7 +175,8 @@ PROPORTION_PRIOR: Final = (log(8.0), 0.7)
 SHARE_PRIOR: Final = (log(0.1), 1.5)
 #: Prior variance of the constant mean of two scales, in squared standard deviations of the outputs: trials crowd where
 #: the response is good, so that their mean is far from that of the box. With 1 in place of 0 the median error on twelve
-#: grasp runs was 0.26 in place of 0.29 before there was the smooth model. python -m benchmarks.model_error --seeds 0 1 2
+#: grasp runs was 0.26 in place of 0.29, before there was the smooth model: python -m benchmarks.model_error --seeds
+#: 0 1 2.
 CONSTANT_MEAN_VARIANCE: Final = 1.0
 #: Nugget, as a fraction of the signal variance: small, for observations are exact unless `noise` says otherwise.
 #: Never measured.
