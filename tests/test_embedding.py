@@ -70,6 +70,11 @@ def test_dividing_the_bins_keeps_every_trial_where_it_was():
         (lambda: RandomEmbedding(sh.Box.unit(3), dimension=0), "dimension is 0"),
         (lambda: NestedEmbedding(sh.Box.unit(3), trials=0, dimension=1), "0 embeddings or trials"),
         (lambda: RandomEmbedding(sh.Box.unit(3), 2, input_noise=sh.InputNoise.unit(0.1)), "input_noise is about"),
+        (lambda: RandomEmbedding(sh.Box.unit(3), 2, allowed=lambda x: True), "allowed is about"),
+        (lambda: RandomEmbedding(sh.Box.unit(3), 2, constraints={"a": (0.0, 1.0)}), "knows no constraints"),
+        (lambda: NestedEmbedding(sh.Box.unit(3), 9, direction="minimize"), "knows no direction"),
+        (lambda: RandomEmbedding(sh.Box({"n": (0, 9, "int"), "m": (0, 9, "int")}), 1), "of plain intervals"),
+        (lambda: RandomEmbedding(sh.Box.unit(3), 2, seed=-1), "seed is -1"),
         (lambda: RandomEmbedding(sh.Box.unit(3), 2).best(), "no trial has given a value"),
         (lambda: RandomEmbedding(sh.Box.unit(3), 2).tell(np.zeros(3), 1.0), "was not asked for"),
     ],
@@ -77,6 +82,15 @@ def test_dividing_the_bins_keeps_every_trial_where_it_was():
 def test_bad_input_is_said_in_one_line(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+@pytest.mark.parametrize("search", [RandomEmbedding(sh.Box.unit(3), 2), NestedEmbedding(sh.Box.unit(3), 9, 2)])
+def test_a_bad_answer_can_be_told_again(search):
+    x = search.ask()
+    with pytest.raises(InputError):
+        search.tell(x, "a")
+    search.tell(x, 1.0)
+    assert search.best()[1] == 1.0
 
 
 def test_the_first_stage_is_no_larger_than_the_box():

@@ -82,7 +82,6 @@ print("works")
         ("", ["typer"], "cli"),
         ("grasp mug", ["trimesh"], "grasp"),
         ("maximize rkhs", ["matplotlib"], "report"),
-        ("campaign list", ["joblib"], "campaign"),
         ("study status nothing", ["optuna"], "study"),
         ("explore bottle --trials 1", ["igl"], "mesh"),
     ],

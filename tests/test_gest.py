@@ -80,6 +80,16 @@ def test_points_of_others_failures_and_unknown_ids():
         generator.ingest([{"x": 0.5, "y": 0.5, "f": 0.3, "_id": 99}])
 
 
+def test_a_point_without_its_constraint_stays_under_way():
+    vocs = VOCS(variables={"x": [0.0, 1.0]}, objectives={"f": "MAXIMIZE"}, constraints={"c": ["LESS_THAN", 0.5]})
+    generator = RobustGenerator(vocs)
+    (point,) = generator.suggest()
+    with pytest.raises(InputError, match="lacks c"):
+        generator.ingest([point | {"f": 1.0}])
+    generator.ingest([point | {"f": 1.0, "c": 0.1}])
+    np.testing.assert_array_equal(generator.optimizer.y, [1.0])
+
+
 @pytest.mark.parametrize(
     ("vocs", "message"),
     [

@@ -260,9 +260,9 @@ LOCAL_GLOBAL_BURN_IN: Final = 5
 
 # --- the trust region, an option --------------------------------------------------------------------------------------
 
-#: First, largest and smallest side of the box, in box widths; successes and failures in a row after which it doubles or
-#: halves; and the share of |best value| by which a trial must exceed it to count as a success: the values of Eriksson
-#: et al. 2019 (TuRBO-1), for one trial at a time. Never measured here.
+#: First, largest and smallest side of the box, in box widths; successes in a row after which it doubles, failures (d
+#: where that is more) after which it halves; and the share of |best value| by which a trial must exceed it to count as
+#: a success: the values of Eriksson et al. 2019 (TuRBO-1), for one trial at a time. Never measured here.
 TRUST_FIRST: Final = 0.8
 TRUST_LARGEST: Final = 1.6
 TRUST_SMALLEST: Final = 0.5**7

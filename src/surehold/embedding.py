@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.optimization.assembly import whole_number
 from surehold.optimization.box import Box
 from surehold.optimization.optimizer import Optimizer
 
@@ -57,6 +58,7 @@ class RandomEmbedding:
 
     def __init__(self, box: Box, dimension: int, *, embeddings: int = 1, seed: int = 0, **settings: Any):
         _check(box, dimension, settings)
+        whole_number("seed", seed, 0)
         self.box: Final = box
         self._asked: list[tuple[NDArray[np.float64], int, NDArray[np.float64]]] = []
         self._told: list[tuple[NDArray[np.float64], float]] = []
@@ -78,8 +80,10 @@ class RandomEmbedding:
 
     def tell(self, x: NDArray[np.float64], y: float | None = None, *, failed: bool = False) -> None:
         """Record what a trial x (D,), as `ask` gave it, has given; raises InputError where it was not asked for."""
-        _, turn, z = _taken(self._asked, x)
+        entry = _under_way(self._asked, x)
+        _, turn, z = self._asked[entry]
         self._optimizers[turn].tell(z, y, failed=failed)
+        del self._asked[entry]
         if y is not None:
             self._told.append((np.array(x), float(y)))
 
@@ -114,6 +118,7 @@ class NestedEmbedding:
     def __init__(self, box: Box, trials: int, dimension: int | None = None, *, seed: int = 0, **settings: Any):
         dimension = min(_FIRST_BINS, box.dimension) if dimension is None else dimension
         _check(box, dimension, settings)
+        whole_number("seed", seed, 0)
         self.box: Final = box
         self._settings: Final = {"trust_region": True, **settings}
         self._seed: Final = seed
@@ -149,8 +154,10 @@ class NestedEmbedding:
 
     def tell(self, x: NDArray[np.float64], y: float | None = None, *, failed: bool = False) -> None:
         """Record what a trial x (D,), as `ask` gave it, has given; raises InputError where it was not asked for."""
-        z = _taken(self._asked, x)[2]
+        entry = _under_way(self._asked, x)
+        z = self._asked[entry][2]
         self._optimizer.tell(z, y, failed=failed)
+        del self._asked[entry]
         self._places.append(z)
         self._values.append(np.nan if y is None else float(y))
         if y is not None:
@@ -183,11 +190,16 @@ class NestedEmbedding:
 def _check(box: Box, dimension: int, settings: dict[str, Any]) -> None:
     if not isinstance(box, Box):
         raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
+    if not box.plain:
+        raise InputError(f"{box!r} has logarithms, whole numbers or choices; an embedding is of plain intervals.")
     if isinstance(dimension, bool) or not isinstance(dimension, int) or not 1 <= dimension <= box.dimension:
         raise InputError(f"dimension is {dimension!r}; give 1 to {box.dimension}, the number of variables.")
-    for name in ("input_noise", "fixed", "initial_points", "lattice", "direction"):
+    for name in ("input_noise", "fixed", "initial_points", "allowed"):
         if settings.get(name) is not None:
             raise InputError(f"{name} is about the variables of the box, not of an embedding; leave it out.")
+    for name in ("direction", "constraints", "conditions", "outcome"):
+        if settings.get(name) is not None:
+            raise InputError(f"an embedding maximizes one value and knows no {name}; leave it out.")
 
 
 def _positive(count: int) -> int:
@@ -196,10 +208,10 @@ def _positive(count: int) -> int:
     return count
 
 
-def _taken(asked: list[tuple[NDArray[np.float64], int, Any]], x: NDArray[np.float64]) -> tuple[Any, int, Any]:
+def _under_way(asked: list[tuple[NDArray[np.float64], int, Any]], x: NDArray[np.float64]) -> int:
     for i, entry in enumerate(asked):
         if np.array_equal(entry[0], x):
-            return asked.pop(i)
+            return i
     raise InputError("this trial was not asked for, or has been told; an embedding takes the points that it gave.")
 
 

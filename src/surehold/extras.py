@@ -12,7 +12,7 @@ EXTRAS: Final[dict[str, tuple[str, ...]]] = {
     "grasp": ("trimesh", "manifold3d", "pydantic", "PyYAML"),
     "cli": ("typer", "rich"),
     "report": ("matplotlib", "jinja2"),
-    "campaign": ("joblib", "pydantic", "PyYAML"),
+    "campaign": ("pydantic", "PyYAML"),
     "study": ("optuna", "optuna-dashboard", "psycopg", "fastapi", "uvicorn", "pydantic"),
     "mujoco": ("mujoco",),
     "mesh": ("libigl",),

@@ -123,26 +123,27 @@ class RobustGenerator(Generator):
         """Learn from points that were evaluated, whether they were suggested or not.
 
         An objective that is missing or no finite number is a failed trial. Raises InputError for an `_id` that is not
-        under way.
+        under way, and for a constraint that is missing.
         """
         for result in results:
             number = result.get("_id")
             if number is None or (isinstance(number, float) and math.isnan(number)):
                 place: Any = {name: self._told(name, result[name]) for name in self.vocs.variables}
             elif number in self._asked:
-                place = self._asked.pop(number)
+                place = self._asked[number]
             else:
                 raise InputError(f"point {number!r} is not under way; leave _id out of points that others suggested.")
             value = result.get(self._objective)
             if value is None or not abs(value) <= LARGEST:
                 self.optimizer.tell(place, failed=True)
-                continue
-            outputs = {name: result[name] for name in self.vocs.constraints}
-            self.optimizer.tell(
-                place,
-                float(value),
-                constraints={name: v if abs(v) <= LARGEST_SQUARED else None for name, v in outputs.items()} or None,
-            )
+            else:
+                outputs = {name: result.get(name) for name in self.vocs.constraints}
+                if missing := [name for name, output in outputs.items() if output is None]:
+                    raise InputError(f"point {number!r} lacks {', '.join(missing)}; give every constraint its value.")
+                told = {n: v if abs(v or 0.0) <= LARGEST_SQUARED else None for n, v in outputs.items()}
+                self.optimizer.tell(place, float(value), constraints=told or None)
+            if isinstance(place, AskedTrial):
+                del self._asked[place.number]
 
     def recommend(self) -> Recommendation:
         """Return the answer so far; see `Optimizer.recommend`."""

@@ -67,6 +67,16 @@ def test_a_robust_problem_brings_its_own_noise(name):
     assert unit.unit_covariance(Box.unit(box.dimension)) == pytest.approx(stated.noise.unit_covariance(box))
 
 
+def test_samples_of_a_robust_problem_stay_samples():
+    """The worst of StableOpt's polynomial is that of a disc of radius 0.5, not of a normal variable."""
+    noise, box = robust_problem("stableopt-polynomial").noise, robust_problem("stableopt-polynomial").function.box
+    unit = unit_noise_of(ProblemSetup("stableopt-polynomial", 8, 5, input_noise="own"))
+    drawn = unit.draws(Box.unit(2), np.full(2, 0.5), 500, np.random.default_rng(0)) * box.widths
+    radii = np.hypot(*drawn.T)
+    np.testing.assert_allclose(radii[radii > 0.0], 0.5)
+    assert unit.unit_covariance(Box.unit(2)) == pytest.approx(noise.unit_covariance(box))
+
+
 def test_noise_of_its_own_needs_a_problem_that_states_it():
     with pytest.raises(InputError, match="states no input noise"):
         checked_problem("a", ProblemSetup("gm", 8, 5, input_noise="own"))

@@ -67,3 +67,12 @@ def test_empty_and_bad_input():
         grasp_batch(simulator, poses, [0.0, 1.0])
     with pytest.raises(InputError, match="finite"):
         grasp_batch(simulator, poses, float("nan"))
+    with pytest.raises(InputError, match=r"s1 has shape \(3, 2\), and preshape 'power' 1 amplitude"):
+        grasp_batch(simulator, poses, np.zeros((3, 2)))
+    np.testing.assert_array_equal(
+        grasp_batch(simulator, poses, np.zeros((3, 1))).quality, grasp_batch(simulator, poses).quality
+    )
+    stretched = np.array([pose.matrix for pose in poses]) * [[[2.0, 2.0, 2.0, 1.0]]]
+    for quality in ("epsilon", "closure"):
+        with pytest.raises(InputError, match="no rotation"):
+            grasp_batch(Simulator(obj="bottle", quality=quality), stretched)

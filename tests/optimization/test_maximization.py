@@ -368,6 +368,10 @@ def test_a_callback_ends_processes_and_forgets_what_was_under_way():
     assert len(result.optimizer.pending) == 0
 
 
+def test_a_callback_ends_the_run_with_a_flag_of_numpy():
+    assert len(maximize(parabola, BOX, n_trials=6, callback=lambda trial: np.bool_(trial.index == 1)).y) == 2
+
+
 def test_what_goes_wrong_in_a_process_is_said():
     import threading
 

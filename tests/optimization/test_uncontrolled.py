@@ -134,3 +134,9 @@ def test_samples_outside_of_the_bounds():
         Optimizer(BRANIN, criterion="log_ei")
     with pytest.raises(InputError, match="fixed names 'b', which is uncontrolled"):
         Optimizer(BRANIN, fixed={"b": 3.0})
+
+
+def test_a_trial_that_the_rig_lost_says_nothing_of_its_condition():
+    optimizer = Optimizer(BRANIN, conditions="measured", n_initial=4)
+    optimizer.tell(optimizer.ask(), failed="rig")
+    assert not len(optimizer.y)

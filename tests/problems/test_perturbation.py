@@ -114,3 +114,8 @@ def test_what_nobody_sets_is_drawn():
     score = robust_score(Function(lambda x: -((x[0] - x[1]) ** 2), box), [0.4, 0.8], None, n=20_000)
     error = score.std / np.sqrt(20_000)
     assert score.mean == pytest.approx(-np.mean((0.4 - loads) ** 2), abs=4 * error)
+
+
+def test_an_unknown_border_rule():
+    with pytest.raises(InputError, match="border rule of re-queries 'clip' is unknown"):
+        perturbed_points([0.5], Box.unit(1), InputNoise.unit(0.1), 3, border="clip")

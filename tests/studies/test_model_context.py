@@ -97,3 +97,26 @@ def test_the_command_over_the_standard_streams(study):
     assert {"ask", "tell", "recommend", "next_trial", "add", "status", "trials"} == tools
     assert json.loads(answer.content[0].text)["id"] == 0
     assert len(study.trials()) == 1
+
+
+def test_limits_and_what_was_not_the_place(tmp_path):
+    settings = StudySettings(SearchSpace(RKHS.box), NOISE, {}, {"seed": 0, "constraints": {"torque": [None, 3.0]}})
+    limited = RobotStudy.create("limited", settings, str(tmp_path / "journal.log"))
+
+    async def loop():
+        async with Client(model_context_server(limited)) as client:
+            id = (await client.call_tool("ask", {})).structured_content["id"]
+            lacking = await client.call_tool("tell", {"id": id, "value": 1.0})
+            told = await client.call_tool("tell", {"id": id, "value": 1.0, "constraints": {"torque": 2.0}})
+            added = {"parameters": {"x": 0.5}, "value": 2.0, "constraints": {"torque": 4.0}}
+            await client.call_tool("add", added)
+            other = (await client.call_tool("ask", {})).structured_content["id"]
+            rig = await client.call_tool("tell", {"id": other, "failed": "rig"})
+            return lacking, told, rig, (await client.call_tool("trials", {})).structured_content["trials"]
+
+    lacking, told, rig, trials = asyncio.run(loop())
+    assert "torque" in lacking.content[0].text
+    assert told.structured_content["value"] == 1.0
+    assert not rig.is_error
+    assert [trial["value"] for trial in trials[:2]] == [1.0, 2.0]
+    limited.close()

@@ -235,3 +235,26 @@ def test_a_choice_counts_as_one_variable_in_the_size_of_the_design():
 def test_input_noise_that_is_a_number_names_the_right_call():
     with pytest.raises(InputError, match=r"InputNoise.unit\(0.03\)"):
         sh.Sampler({"x": (0.0, 1.0), "grip": CategoricalDistribution(["a", "b"])}, input_noise=0.03)
+
+
+def test_settings_about_variables_wait_for_them():
+    """Without a search space nothing is known of the variables that they name, until trials have said them."""
+    first = [{"a": 0.25, "b": 0.5}]
+    sampler = sh.Sampler(allowed="a + b <= 1.2", initial_points=first, seed=0)
+    study = optuna.create_study(direction="maximize", sampler=sampler)
+    study.optimize(lambda trial: trial.suggest_float("a", 0.0, 1.0) - trial.suggest_float("b", 0.0, 1.0), n_trials=8)
+    assert all(trial.params["a"] + trial.params["b"] <= 1.2 for trial in study.trials[1:])
+
+
+def test_the_size_of_the_design_is_the_optimizers():
+    space = {f"x{i}": (0.0, 1.0) for i in range(6)}
+    fixed = {"x0": 0.1, "x1": 0.1, "x2": 0.1, "x3": 0.1}
+    sampler = sh.Sampler(space, fixed=fixed)
+    assert sampler.n_initial(SearchSpace(space)) == sh.Optimizer(sh.Box(space), fixed=fixed).n_initial
+    points = np.full((25, 6), 0.5) + 0.01 * np.arange(25)[:, None]
+    assert sh.Sampler(space, initial_points=points).n_initial(SearchSpace(space)) == 25
+
+
+def test_trials_of_a_study_tell_no_noise():
+    with pytest.raises(InputError, match="do not tell their noise"):
+        sh.Sampler(SPACE, noise="told")

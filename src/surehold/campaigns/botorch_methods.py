@@ -25,12 +25,11 @@ _COUNTED: Final = 20  # variables of the best trial that a candidate changes, in
 class BoTorch:
     """BoTorch: SingleTaskGP and LogExpectedImprovement; with the noise known, its input perturbation.
 
-    With `root` (d, d) of the noise's covariance in the unit cube (`bounded` for uniform noise) the model averages over
-    16 quasi-random perturbations, the criterion is the expected improvement of that average, and the answer the
-    observed input with the best one.
+    With `perturbations` (s, d) of the unit cube the model averages over them, the criterion is the expected improvement
+    of that average, and the answer the observed input with the best one.
     """
 
-    def __init__(self, dimension: int, initial: Array, seed: int, root: Array | None = None, bounded: bool = False):
+    def __init__(self, dimension: int, initial: Array, seed: int, perturbations: Array | None = None):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # importing it warns
             import torch
@@ -39,14 +38,9 @@ class BoTorch:
         torch.set_num_threads(1)
         torch.manual_seed(seed)
         self._shifts = self._average = None
-        if root is not None:
-            from scipy.special import ndtr
-            from scipy.stats import qmc
-
-            normals = qmc.MultivariateNormalQMC(np.zeros(dimension), rng=np.random.default_rng(seed)).random(16)
-            standard = 3.0**0.5 * (2.0 * ndtr(normals) - 1.0) if bounded else normals
-            self._shifts = torch.tensor(standard @ root.T)
-            self._average = ExpectationPosteriorTransform(n_w=len(normals))
+        if perturbations is not None:
+            self._shifts = torch.tensor(perturbations)
+            self._average = ExpectationPosteriorTransform(n_w=len(perturbations))
         self._told = Told(initial)
         self._model: tuple[int, Any] | None = None
 

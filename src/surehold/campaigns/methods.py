@@ -17,6 +17,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise, root_of
+from surehold.optimization.noise.samples import Samples
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.strategy.thesis import thesis_preset
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
@@ -118,7 +119,7 @@ def build_method(cell: Cell, dimension: int, initial: NDArray[np.float64], seed:
     if cell.by.optimizer not in installed_peers():
         missing = ", ".join(REQUIRES[cell.by.optimizer])
         raise InputError(f"method '{cell.method}' needs {missing}; install them: pip install 'surehold[peers]'.")
-    extra = {} if noise is None else {"root": _root(noise, dimension), "bounded": noise.bounded}
+    extra = {} if noise is None else {"perturbations": _perturbations(noise, dimension, seed)}
     return PEERS[cell.by.optimizer](dimension, initial, seed, **extra)
 
 
@@ -161,11 +162,18 @@ def checked_settings(where: str, optimizer: str, settings: Mapping[str, Any], ro
         raise InputError(f"{where}: '{optimizer}' cannot be told of input noise; leave `robust` out.")
 
 
-def _root(noise: InputNoise, dimension: int) -> NDArray[np.float64]:
-    """Return the root (d, d) of the covariance of noise that is the same everywhere."""
+def _perturbations(noise: InputNoise, dimension: int, seed: int) -> NDArray[np.float64]:
+    """Return 16 quasi-random perturbations (s, d) of noise that is the same everywhere; where it is samples, these."""
     if noise.varies:
         raise InputError(f"BoTorch is told of input noise that is the same everywhere, not {noise!r}.")
-    return root_of(noise.unit_covariance(Box.unit(dimension)))
+    if isinstance(noise.kind, Samples):
+        return noise.kind.errors
+    from scipy.special import ndtr
+    from scipy.stats import qmc
+
+    normals = qmc.MultivariateNormalQMC(np.zeros(dimension), rng=np.random.default_rng(seed)).random(16)
+    standard = 3.0**0.5 * (2.0 * ndtr(normals) - 1.0) if noise.bounded else normals
+    return standard @ root_of(noise.unit_covariance(Box.unit(dimension))).T
 
 
 def _treed(own: dict[str, Any], box: Box, input_noise: InputNoise | None, seed: int) -> TreedGaussianProcess:

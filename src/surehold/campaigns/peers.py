@@ -146,7 +146,7 @@ class RandomSearch:
         return self._told.best()
 
 
-#: Maker of each peer by name; the keywords `root` and `bounded` go to those that can be told of the input noise.
+#: Maker of each peer by name; the keyword `perturbations` goes to those that can be told of the input noise.
 PEERS: Final[dict[str, Callable[..., Any]]] = {
     "optuna-gp": Optuna,
     "optuna-tpe": lambda d, initial, seed: Optuna(d, initial, seed, "TPESampler"),

@@ -10,6 +10,7 @@ from surehold.campaigns.plan import ProblemSetup
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.samples import Samples
 from surehold.problems.problem import Problem
 
 if TYPE_CHECKING:
@@ -103,6 +104,8 @@ def unit_noise_of(on: ProblemSetup) -> InputNoise | None:
     names = Box.unit(box.dimension).names
     covariance = noise.unit_covariance(box)
     deviations = np.sqrt(np.diag(covariance))
+    if isinstance(noise.kind, Samples):
+        return InputNoise.samples(noise.kind.errors / box.widths)
     if noise.varies:
         return InputNoise.varying(lambda u: noise.unit_covariance(box, box.from_unit(u)))
     if noise.bounded:

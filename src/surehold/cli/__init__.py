@@ -9,7 +9,7 @@ __all__ = ["completed", "main"]
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit.
 
-    0: done; 1: nothing came of it; 2: bad input; 3: no trial succeeded; 130: interrupted with nothing to keep.
+    0: done; 1: nothing came of it; 2: bad input; 3: nothing found that succeeds; 130: interrupted with nothing to keep.
     Every expected error is one line on the standard error stream.
     """
     sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))

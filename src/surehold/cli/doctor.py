@@ -15,7 +15,7 @@ from surehold.amounts import amount
 
 __all__ = ["doctor"]
 
-CORE = ("numpy", "scipy", "numba", "threadpoolctl", "lazy_loader")
+CORE = ("numpy", "scipy", "numba", "threadpoolctl", "lazy_loader", "filelock", "joblib")
 
 
 def doctor(

@@ -11,7 +11,7 @@ import typer
 
 from surehold.amounts import amount
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
-from surehold.cli.options import Noise, Open, Out, Seed, noise_of
+from surehold.cli.options import Open, Out, Seed, noise_of
 from surehold.cli.study_options import Storage
 from surehold.errors import InputError, unknown_name
 
@@ -30,7 +30,9 @@ def explore(
     start: Annotated[str, typer.Option(help="What is known first: box, or view (of a camera, 1000 points).")] = "box",
     goal: Annotated[str, typer.Option(help="grasp: find a safe one; shape: know the shape.")] = "grasp",
     probe: Annotated[bool, typer.Option("--probe", help="End a trial at the first contact.")] = False,
-    noise: Noise = "0.03",
+    noise: Annotated[
+        str | None, typer.Option(help="What the hand strays: a share of every range, or NAME=DEVIATION,... [m, rad].")
+    ] = "0.03",
     seed: Seed = 0,
     box: Annotated[
         str, typer.Option(help="Of --study: edges of the object's box, x,y,z [m].", show_default=False)
@@ -70,6 +72,9 @@ def explore(
     console = terminal()
     described = {"object": obj, **options, "variables": names}
     if study:
+        for option, given in (("--start", start != "box"), ("--probe", probe), ("--out", out), ("--open", open_page)):
+            if given:
+                raise InputError(f"{option} is of an exploration in simulation; a robot's --study goes without it.")
         console.print(_created(study, storage, described, box, goal, input_noise, seed), markup=False, soft_wrap=True)
         return
     if not obj:

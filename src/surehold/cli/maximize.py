@@ -75,7 +75,8 @@ def maximize(
     study: Study = "",
     storage: StudyStorage = "",
     tolerate_failures: Annotated[
-        bool, typer.Option("--tolerate-failures", help="Go on although the first three trials all failed.")
+        bool,
+        typer.Option("--tolerate-failures", help="Go on although the first three trials all failed; a --study does."),
     ] = False,
     constraint: Constraint = None,
     allowed: Allowed = None,

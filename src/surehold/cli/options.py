@@ -144,7 +144,7 @@ def noise_of(text: str, method: str) -> InputNoise | None:
     if "=" not in text:
         share = _number(text)
         if share == 0.0:
-            raise InputError("--noise 0 is no input noise; give --noise none --method bo, or how far the input strays.")
+            raise InputError("--noise 0 is no input noise; give what the input strays, such as 0.03, or none.")
         return InputNoise.unit(share)
     deviations: dict[str, float] = {}
     for part in text.split(","):

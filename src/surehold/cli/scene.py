@@ -19,7 +19,10 @@ _COLUMNS = ("object", "mode", "standoff [mm]", "s1", "dx, dy [mm]", "status", "q
 _ALONG, _ACROSS = 9, 5  # grasps that are tried in a mode
 
 
-@partial(takes_grasp_options, without=("variables",))
+_UNUSED = ("variables", "cloud", "camera", "normals", "contacts", "cloud_noise", "prior", "shapes")
+
+
+@partial(takes_grasp_options, without=_UNUSED)
 def scene(
     obj: Annotated[
         str, typer.Argument(metavar="[OBJECT]", help="mug, bottle, glass, drill, or a mesh file; all four by default.")

@@ -16,10 +16,11 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.amounts import amount
 from surehold.errors import InputError
 from surehold.grasping.grasp import STATUSES
 from surehold.grasping.hand.synergy import preshape_of
-from surehold.grasping.poses import Pose
+from surehold.grasping.poses import Pose, check_rotations
 from surehold.grasping.simulator import Simulator
 from surehold.grasping.trial_loop import UNDECIDED, run_trials
 from surehold.grasping.wrench.ellipsoids import RoundCones
@@ -68,7 +69,8 @@ def grasp_batch(
     Raises
     ------
     InputError
-        If workers is not a positive integer, s1 has another shape, or a pose or posture is not finite.
+        If workers is not a positive integer, s1 has another shape, a pose or posture is not finite, or a matrix is no
+        rotation.
     """
     if isinstance(workers, bool) or not isinstance(workers, int | np.integer) or workers < 1:
         raise InputError(f"workers are {workers!r}; give an integer of 1 or more.")
@@ -76,6 +78,12 @@ def grasp_batch(
     if postures.shape[:1] not in ((), (len(poses),)) or postures.ndim > 2:
         raise InputError(f"s1 has shape {postures.shape}; give one number or one for each of the {len(poses)} poses.")
     postures = postures if postures.ndim else np.broadcast_to(postures, len(poses))
+    most = 1 + len(preshape_of(simulator.hand, simulator.preshape).further)
+    if postures.ndim > 1 and not 1 <= postures.shape[1] <= most:
+        raise InputError(
+            f"s1 has shape {postures.shape}, and preshape {simulator.preshape!r} {amount(most, 'amplitude')}; give "
+            f"(n,), or at most (n, {most})."
+        )
     chunk = max(1, min(_CHUNK, len(poses) // (4 * workers)))
     parts = [slice(start, start + chunk) for start in range(0, len(poses), chunk)]
     cones = simulator.measure.round_cones()
@@ -109,10 +117,11 @@ def _compiled_outcomes(
         matrix[:] = pose.matrix if isinstance(pose, Pose) else pose
     if not (np.isfinite(matrices).all() and np.isfinite(postures).all()):
         raise InputError("a pose or posture of the batch is not finite; give finite numbers.")
+    check_rotations(matrices[:, :, :3])
     chosen = preshape_of(simulator.hand, simulator.preshape)
     first, *others = postures.T if postures.ndim > 1 else (postures,)
     starts = chosen.start + first[:, None, None] * chosen.posture
-    for amplitudes, component in zip(others, chosen.further, strict=True):
+    for amplitudes, component in zip(others, chosen.further, strict=False):
         starts += amplitudes[:, None, None] * component
     table = np.empty((len(poses), 6))
 

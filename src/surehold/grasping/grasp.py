@@ -25,7 +25,9 @@ class Grasp:
     """Outcome of one trial. Points and normals are in the frame of the object."""
 
     status: Status  #: see `STATUSES`
-    quality: float  #: the measure that was asked for; 0 without two contacts; a collision's is 0 or below
+    quality: (
+        float  #: the measure asked for; without two contacts 0, or below of signed_epsilon; a collision's 0 or below
+    )
     pose: Pose  #: from the palm frame to the object's frame
     s1: float | tuple[float, ...]  #: posture variable [rad]; all amplitudes of a preshape that has several
     joints: Array = field(

@@ -21,7 +21,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.grasping.hand.model import Hand
 from surehold.grasping.object.model import GraspObject
 
-__all__ = ["FACETS", "MODES", "Pose", "default_pose"]
+__all__ = ["FACETS", "MODES", "Pose", "check_rotations", "default_pose"]
 
 Array = NDArray[np.float64]
 _EYE: Final = np.eye(3)
@@ -58,10 +58,8 @@ class Pose:
         m = np.asarray(matrix, dtype=np.float64)
         if m.shape not in ((3, 4), (4, 4)) or not np.all(np.isfinite(m)):
             raise InputError(f"pose matrix of shape {m.shape} is not (3, 4) or (4, 4) of finite numbers.")
-        r = m[:3, :3]
-        if not (np.allclose(r @ r.T, np.eye(3), atol=1e-6) and np.linalg.det(r) > 0.0):
-            raise InputError("the 3 x 3 part of the pose matrix is no rotation; its columns must be right-handed axes.")
-        return _pose(r, m[:3, 3])
+        check_rotations(m[:3, :3])
+        return _pose(m[:3, :3], m[:3, 3])
 
     @property
     def is_finite(self) -> bool:
@@ -146,6 +144,13 @@ def facet_axes(mode: str) -> Array:
         raise unknown_name("facet and thumb direction", mode, neighbors)
     z, x = -np.array(_NORMALS[facet]), -np.array(_NORMALS[thumb])
     return np.column_stack([x, np.cross(z, x), z])
+
+
+def check_rotations(matrices: Array) -> None:
+    """Raise InputError unless all matrices (..., 3, 3) are rotations."""
+    squared = matrices @ np.swapaxes(matrices, -1, -2)
+    if not (np.allclose(squared, np.eye(3), atol=1e-6) and np.all(np.linalg.det(matrices) > 0.0)):
+        raise InputError("the 3 x 3 part of the pose matrix is no rotation; its columns must be right-handed axes.")
 
 
 def default_pose(

@@ -35,7 +35,7 @@ class Simulator:
     Parameters
     ----------
     hand
-        A `Hand` or the name of a shipped one: "icub-left", "icub-right".
+        A `Hand` or the name of one: "icub-left", "icub-right"; "shadow", "panda" where their packages are installed.
     obj
         A `GraspObject` or the name of a shipped one: "mug", "bottle", "glass", "drill".
     contact
@@ -134,9 +134,10 @@ class Simulator:
 
     @uninterrupted()
     def grasp(self, pose: Pose, s1: float | tuple[float, ...] = 0.0) -> Grasp:
-        """Close the hand at a pose of its palm in the world with posture s1 [rad]; a bad grasp has quality 0.
+        """Close the hand at a pose of its palm in the world with posture s1 [rad].
 
-        Of a preshape with several amplitudes, `s1` may be all of them.
+        A bad grasp has quality 0, or below where it says how bad. Of a preshape with several amplitudes, `s1` may be
+        all of them.
 
         Raises
         ------
@@ -167,11 +168,13 @@ class Simulator:
     def quality_at(self, pose: Pose, joints: ArrayLike) -> float:
         """Return the quality of the skin's contacts of the hand as it stands, without closing it.
 
-        `pose` is from the palm frame to the object's frame, `joints` (f, j) [rad or m]; 0 for fewer than two contacts.
+        `pose` is from the palm frame to the object's frame, `joints` (f, j) [rad or m]; fewer than two contacts count
+        as in `grasp`.
         """
         contacts = self.contacts_at(pose, joints)
         if len(contacts) < 2:
-            return 0.0
+            gaps = self.gaps(pose, np.asarray(joints, dtype=np.float64))[:-1].reshape(self.hand.radii.shape)
+            return self.measure.without_contacts(gaps)
         wrench = self.measure.wrench(contacts.points, contacts.normals, contacts.weights)
         return float(self.measure.value(contacts.points, contacts.normals, wrench))
 

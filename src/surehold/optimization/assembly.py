@@ -98,6 +98,8 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     first = initial_inputs(box, s.initial_points)
     wanted = default_n_initial(box, len(box.variables) - len(s.fixed or ())) if s.n_initial is None else s.n_initial
     wanted = whole_number("n_initial", wanted, 1)
+    if s.safety is not None and s.n_initial is not None:
+        raise InputError("with safety= the initial design is initial_points=, which are trusted; leave n_initial out.")
     n_initial = len(first) if s.safety is not None else max(wanted, len(first))
     told = s.noise == "told"
     thesis = None if s.preset is None else thesis_preset(s.preset)
@@ -206,7 +208,7 @@ def _check(s: SimpleNamespace) -> None:
         if getattr(s, name) not in known:
             shown = "rule for failures" if name == "failures" else name
             raise unknown_name(shown, getattr(s, name), [choice for choice in known if choice is not None])
-    if s.noise == "told" and (s.preset is not None or s.outcome == "success" or s.surrogate not in (None, *TELLABLE)):
+    if s.noise == "told" and s.outcome == "value" and (s.preset is not None or s.surrogate not in (None, *TELLABLE)):
         raise InputError(f"noise='told' needs one of the surrogates {', '.join(TELLABLE)}, and no preset.")
     for name in ("feasible", "safety"):
         value = getattr(s, name)

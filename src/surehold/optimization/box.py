@@ -92,7 +92,7 @@ class Box:
 
     @property
     def dimension(self) -> int:
-        """Number of variables d."""
+        """Number of coordinates d: one a variable, of a choice one for each of its values."""
         return len(self.names)
 
     @property

@@ -196,7 +196,7 @@ def maximize(
         choices; returns a number, with `constraints` a number and a dictionary of the further outputs,
         (y, {"torque": 3.1}); outputs that `constraints` does not name are kept with the trial, unmodelled. A trial
         that raises, or gives anything but one finite number, is recorded as failed and the run goes on. With
-        `outcome="success"` it returns True or False.
+        `outcome="success"` it returns True or False, and anything else ends the run.
     n_trials
         Budget, initial design included.
     callback
@@ -337,9 +337,10 @@ def _told(optimizer: Optimizer, evaluation: Evaluation, index: int) -> Trial:
 
 def _ends(callback: Callable[[Trial], Any], trial: Trial) -> bool:
     try:
-        return callback(trial) is True
+        ends = callback(trial)
     except StopIteration:
         return True
+    return isinstance(ends, (bool, np.bool_)) and bool(ends)
 
 
 def _close(evaluations: Iterator[Evaluation]) -> None:

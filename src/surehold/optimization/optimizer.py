@@ -94,8 +94,8 @@ class Optimizer(Record):
     quadrature
         How the input noise is averaged over: "unscented" (default of the criteria averaged over sigma points),
         "scaled_unscented", "central_difference", "gauss_hermite" or "quasi_monte_carlo" (default of the robust ones);
-        "closed_form" for a GaussianProcess with the squared-exponential kernel. The risk measures "mean-std", "var" and
-        "cvar" take a rule without negative weights.
+        "closed_form" for a GaussianProcess with the squared-exponential kernel. The risk measures but
+        "mean" and "worst" take a rule without negative weights.
     k
         Free parameter of the unscented transformation.
     border

@@ -6,6 +6,8 @@ from contextlib import contextmanager
 from time import perf_counter
 from typing import Final
 
+from surehold.extras import missing
+
 __all__ = ["progress_bar"]
 
 _SILENT: Final = 2.0  # seconds
@@ -13,8 +15,11 @@ _SILENT: Final = 2.0  # seconds
 
 @contextmanager
 def progress_bar(total: int, wanted: bool) -> Iterator[Callable[[float], None]]:
-    """Lend a function to be called with the best value after each of `total` trials; shows nothing off a terminal."""
-    if not wanted or not sys.stderr.isatty():
+    """Lend a function to be called with the best value after each of `total` trials.
+
+    Off a terminal, and without rich, it shows nothing.
+    """
+    if not wanted or not sys.stderr.isatty() or missing("cli"):
         yield lambda best: None
         return
     from rich.console import Console

@@ -99,6 +99,7 @@ class Recommendation:
         Standard deviation of one execution: input noise, observation noise and what the model does not know.
     quantile
         The value that 95 % of executions are better than: they exceed it, or stay below where the optimizer minimizes.
+        Where trials succeed or fail: the share of successes that is exceeded with 95 %.
     observed
         Value that was told at x; NaN where x was never tried. Where the box has uncontrolled variables: told at this
         setting, under the condition of that trial.

@@ -136,7 +136,7 @@ class Record(ABC):
             constraints = {limit.name: None for limit in self.limits} | dict(constraints or {})
         y, executions, failed = counted(self.outcome, y, success, successes, of, failed)
         y = None if y is None else self._sign * number_of(y)
-        if self._conditions_measured:
+        if self._conditions_measured and failed != "rig":
             reached = self._with_conditions(x, reached)
         deviation = told_noise(noise, wanted=self._noise_told and not failed)
         self._trials.tell(x, y, failed, reached, constraints, executions, deviation)
@@ -232,7 +232,14 @@ class Record(ABC):
         """
         told, reported = self._trials.successful, self._trials.reported
         if reported.any():
-            return noise_from_reached(self.box, self._trials.commanded[reported], self._trials.reached[reported])
+            numbers = self.box.numbers
+            if numbers is None:
+                raise InputError("all variables are choices, which carry no input noise.")
+            shown = [self.box.names.index(name) for name in numbers.names]
+            commanded, reached = (
+                points[reported][:, shown] for points in (self._trials.commanded, self._trials.reached)
+            )
+            return noise_from_reached(numbers, commanded, reached)
         with computing():
             return noise_from_repeats(self._trials.commanded[told], self._trials.values[told])
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.samples import Samples
 from surehold.problems.problem import Optimum, checked_points
 from surehold.problems.synthetic import highest
 
@@ -106,6 +107,10 @@ def reached_inputs(
     InputError
         For clipped noise that is correlated, or shakes more than two inputs.
     """
+    if isinstance(noise.kind, Samples):
+        reached = x + noise.kind.errors
+        reached = np.clip(reached, box.lower, box.upper) if clip else reached
+        return reached, np.full(len(reached), 1.0 / len(reached))
     covariance = noise.unit_covariance(box, x) * np.outer(box.widths, box.widths)
     shaken = np.flatnonzero(np.diag(covariance) > 0.0)
     if clip and (shaken.size > 2 or np.count_nonzero(covariance - np.diag(np.diag(covariance)))):

@@ -67,7 +67,7 @@ class Hidden:
 
     def _noise_of_few(self, noise: InputNoise) -> InputNoise:
         noise = needed_input_noise(noise, self.box.names)
-        if noise.bounded or noise.varies:
+        if not noise.kind.gaussian or noise.varies:
             raise InputError(f"{noise!r} has no closed form here; give Gaussian noise that is the same everywhere.")
         return InputNoise(covariance=noise.unit_covariance(self.box)[np.ix_(self.places, self.places)])
 

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surehold.errors import InputError
+from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise, needed_input_noise
 from surehold.problems.problem import Problem, checked_points
@@ -58,7 +58,7 @@ def perturbed_points(
     Raises
     ------
     InputError
-        If n is not a positive integer, or x lies outside the box.
+        If n is not a positive integer, x lies outside the box, or the border rule is unknown.
     """
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= _MOST:
         raise InputError(f"number of perturbations is {n!r}; give an integer from 1 to {_MOST:,}.")
@@ -67,6 +67,8 @@ def perturbed_points(
         raise InputError(f"x has shape {center.shape}; score one point ({box.dimension},) at a time.")
     if not box.contains(center[0]):
         raise InputError(f"x = {center[0].tolist()} lies outside {box!r}; score a point of the box.")
+    if border not in ("keep", "extend"):
+        raise unknown_name("border rule of re-queries", border, ("keep", "extend"))
     rng = np.random.default_rng(seed)
     unit, nobody = box.to_unit(center[0]), box.uncontrolled
     reached = np.tile(unit, (int(n), 1))

@@ -86,13 +86,17 @@ class RobustProblem(NamedTuple):
 
 
 def _quantile(function: Any, point: NDArray[np.float64], noise: InputNoise, alpha: float) -> float:
-    """Return the alpha-quantile of the outcome at a point (d,), by 2^14 quasi-random inputs."""
+    """Return the alpha-quantile of the outcome at a point (d,), by 2^14 quasi-random inputs, or by the samples."""
+    from scipy.special import ndtr
     from scipy.stats import qmc
 
+    if isinstance(noise.kind, Samples):
+        return float(np.quantile(function(point + noise.kind.errors), alpha, method="inverted_cdf"))
     box: Box = function.box
     normals = qmc.MultivariateNormalQMC(np.zeros(box.dimension), rng=np.random.default_rng(0)).random(2**14)
+    standard = 3.0**0.5 * (2.0 * ndtr(normals) - 1.0) if noise.bounded else normals
     root = noise.unit_roots(box, box.to_unit(point)[None])[0]
-    return float(np.quantile(function(point + (normals @ root.T) * box.widths), alpha))
+    return float(np.quantile(function(point + (standard @ root.T) * box.widths), alpha))
 
 
 def _along(angle: float, long: float, short: float) -> NDArray[np.float64]:

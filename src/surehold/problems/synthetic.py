@@ -302,7 +302,7 @@ def highest(f: Callable[[NDArray[np.float64]], object], box: Box, starts: NDArra
 def _covariance(noise: InputNoise, box: Box) -> NDArray[np.float64]:
     """Return the covariance (d, d) of the noise in the units of the box."""
     noise = needed_input_noise(noise, box.names)
-    if noise.bounded or noise.varies:
+    if not noise.kind.gaussian or noise.varies:
         raise InputError(
             f"{noise!r} has no closed form; use robust_score, or Gaussian noise that is the same everywhere."
         )

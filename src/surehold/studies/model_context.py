@@ -56,16 +56,21 @@ def model_context_server(study: RobotStudy) -> MCPServer:
     def tell(
         id: int,
         value: _Value = None,
-        failed: bool = False,
+        failed: bool | Literal["rig"] = False,
         reached: dict[str, Any] | None = None,
+        constraints: dict[str, float | None] | None = None,
+        contacts: dict[str, Any] | None = None,
         successes: int | None = None,
         of: int | None = None,
     ) -> dict[str, Any]:
         """Say what came of a trial: its value, or that it failed; `reached` are the parameters truly reached.
 
-        Where the study is about success the value is success or failure; or tell successes of so many executions.
+        "rig" as `failed`: the parameters are not at fault. `constraints` are the further outputs {name: value} of a
+        study that has limits, `contacts` what the hand touched in one of an unknown shape. Where the study is about
+        success the value is success or failure; or tell successes of so many executions.
         """
-        told = answered(study.tell, id, value, failed=failed, reached=reached, successes=successes, of=of)
+        said = {"failed": failed, "reached": reached, "constraints": constraints, "contacts": contacts}
+        told = answered(study.tell, id, value, **said, successes=successes, of=of)
         return {"id": told.id, "state": told.state, "value": told.value, "already": told.already, "of": told.of}
 
     @server.tool()
@@ -83,11 +88,14 @@ def model_context_server(study: RobotStudy) -> MCPServer:
         parameters: dict[str, Any],
         value: _Value = None,
         failed: bool = False,
+        reached: dict[str, Any] | None = None,
+        constraints: dict[str, float | None] | None = None,
         successes: int | None = None,
         of: int | None = None,
     ) -> dict[str, Any]:
         """Store a trial that was made without being asked for; its outcome as of tell."""
-        return {"id": answered(study.add, parameters, value, failed=failed, successes=successes, of=of)}
+        said = {"failed": failed, "reached": reached, "constraints": constraints}
+        return {"id": answered(study.add, parameters, value, **said, successes=successes, of=of)}
 
     @server.tool(name="status")
     def state() -> dict[str, Any]:

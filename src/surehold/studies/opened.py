@@ -163,7 +163,7 @@ class OpenedStudy:
     def promise(self) -> float | None:
         """Return the improvement that a further trial is expected to bring.
 
-        None during the initial design, and while no trial may become the answer.
+        None during the initial design, while no trial may become the answer, and of a study of an unknown shape.
         """
         with self.storage.failures():
             return self._promise(self._ledger.trials())

@@ -145,7 +145,7 @@ class RobotStudy(OpenedStudy):
         id
             Of the trial, as `ask` gave it.
         value
-            Finite; larger is better. Of a study about success: "success" or "failure", True or False, or "7/10".
+            Finite, in the study's direction. Of a study about success: "success", "failure", True, False, or "7/10".
         failed
             True: the trial gave nothing, and has no value. "rig": the place is not at fault; nothing is learnt, and the
             trial is handed out again, to whoever asks first.

@@ -8,7 +8,7 @@ import threading
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from optuna import logging
@@ -30,6 +30,8 @@ from surehold.studies.search_space import SearchSpace
 
 __all__ = ["Sampler"]
 
+#: Settings that are about the variables, which a sampler without a search space does not know yet.
+_OF_VARIABLES: Final = ("allowed", "fixed", "initial_points", "safety")
 _log = logging.get_logger(__name__)
 
 
@@ -92,6 +94,8 @@ class Sampler(BaseSampler):
             raise InputError("a sampler has no direction of its own; say optuna.create_study(direction=...).")
         if settings.get("outcome") == "preference":
             raise InputError("a study keeps no preferences; make a surehold.Optimizer, and tell_preference(...).")
+        if settings.get("noise") == "told":
+            raise InputError("a study's trials do not tell their noise; give noise='inferred', or its deviation.")
         if search_space is None or isinstance(search_space, SearchSpace):
             self._space = search_space
         else:
@@ -108,7 +112,8 @@ class Sampler(BaseSampler):
         # What is wrong is told now, not at the first trial.
         if self._space is None:
             anything = None if checked_input_noise(input_noise, ("x",)) is None else InputNoise.unit(0.1)
-            Optimizer(Box.unit(1), input_noise=anything, **self._settings)
+            nameless = {name: value for name, value in self._settings.items() if name not in _OF_VARIABLES}
+            Optimizer(Box.unit(1), input_noise=anything, **nameless)
         elif self._space.box is not None:
             self._new_optimizer(self._space, "maximize")
 
@@ -206,10 +211,14 @@ class Sampler(BaseSampler):
 
     def n_initial(self, space: SearchSpace) -> int:
         """Return the size of the initial design in a search space."""
-        given, first = self._settings.get("n_initial"), len(self._settings.get("initial_points") or ())
+        given, points = self._settings.get("n_initial"), self._settings.get("initial_points")
+        first = 0 if points is None else len(points)
         if self._settings.get("safety") is not None:
             return max(first, 1)  # without any, the optimizer says that it needs them
-        return max(Optimizer.default_n_initial(space.box or Box.unit(1)) if given is None else given, first)
+        if given is None:
+            box = space.box or Box.unit(1)
+            given = Optimizer.default_n_initial(box, len(box.variables) - len(self._settings.get("fixed") or ()))
+        return max(given, first)
 
     @contextmanager
     def optimizing(self, space: SearchSpace, history: History, direction: str) -> Iterator[Optimizer]:

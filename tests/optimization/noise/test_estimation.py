@@ -115,3 +115,17 @@ def test_noise_without_offset_is_seldom_taken_for_one():
             noise_from_reached(MIXED, *reports(np.random.default_rng(seed).normal(0.0, 1.0, (12, 2)) * [1e-5, 20.0]))
     assert all("off on average" in str(warning.message) for warning in found)
     assert 0 < len(found) < 12, "3 are expected of 3000"
+
+
+def test_choices_are_left_out_of_what_is_estimated():
+    box = sh.Box({"g": ["a", "b"], "x": (0.0, 1.0)})
+    optimizer, rng = sh.Optimizer(box, n_initial=12, seed=0), np.random.default_rng(0)
+    strays = []
+    for _ in range(12):
+        trial = optimizer.ask_trial()
+        strays.append(rng.normal(0.0, 0.02))
+        reached = {**trial.parameters, "x": trial.parameters["x"] + strays[-1]}
+        optimizer.tell(trial, 0.0, reached=reached)
+    noise = optimizer.estimate_input_noise()
+    assert np.sqrt(noise.unit_covariance(sh.Box({"x": (0.0, 1.0)}))[0, 0]) == pytest.approx(np.std(strays), rel=0.2)
+    sh.Optimizer(box, input_noise=noise)

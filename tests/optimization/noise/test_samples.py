@@ -3,7 +3,7 @@ import pytest
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
-from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.input_noise import InputNoise, noise_of_coordinates
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.samples import representatives
 from surehold.optimization.optimizer import Optimizer
@@ -85,6 +85,15 @@ def test_stored_and_restored():
     noise = InputNoise.samples(SKEWED[:10])
     again = InputNoise.from_json(noise.to_json())
     assert np.array_equal(again.unit_covariance(Box.unit(2)), noise.unit_covariance(Box.unit(2)))
+
+
+def test_samples_beside_a_choice_keep_their_mean_and_skew():
+    box = Box({"g": ["a", "b"], "x": (0.0, 2.0)})
+    noise = noise_of_coordinates(InputNoise.samples([0.0, 0.0, 0.0, -0.1]), box)
+    drawn = noise.draws(box, np.full(box.dimension, 0.5), 4000, np.random.default_rng(0))
+    x = box.names.index("x")
+    assert sorted(set(drawn[:, x])) == [-0.05, 0.0]
+    assert not np.delete(drawn, x, axis=1).any()
 
 
 @pytest.mark.parametrize(

@@ -39,6 +39,8 @@ def test_repeats_itself_and_needs_noise_where_it_says_so():
     np.testing.assert_array_equal(first.X, second.X)
     with pytest.raises(InputError, match="input noise"):
         sh.Optimizer(GM.box, criterion="robust_thompson")
+    with pytest.raises(InputError, match="knows no trust region"):
+        sh.Optimizer(GM.box, criterion="thompson", trust_region=True)
 
 
 def test_a_point_is_taken_as_often_as_it_is_the_maximum():

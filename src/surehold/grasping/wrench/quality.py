@@ -90,8 +90,8 @@ class Measure:
             raise InputError(f"friction is {self.friction!r}; give a number from 0 to 10, such as 0.5.")
         if not (np.isfinite(self.torsion) and 0.0 <= self.torsion < 0.1):
             raise InputError(f"torsion is {self.torsion!r} m; give a length from 0 to 0.1 m, such as 0.001.")
-        if isinstance(self.edges, bool) or not isinstance(self.edges, int | np.integer) or self.edges < 3:
-            raise InputError(f"edges of the friction cone are {self.edges!r}; give an integer of 3 or more, such as 8.")
+        if isinstance(self.edges, bool) or not isinstance(self.edges, int | np.integer) or not 3 <= self.edges <= 1000:
+            raise InputError(f"edges of the friction cone are {self.edges!r}; give an integer, 3 to 1000, such as 8.")
         if self.task is not None and self.name != "task":
             raise InputError(f"a task is given, but the quality is {self.name!r}; ask for quality='task'.")
         self._task_wrenches  # noqa: B018  # a bad task is refused at once

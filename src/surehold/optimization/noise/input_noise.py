@@ -246,6 +246,10 @@ def noise_of_coordinates(noise: InputNoise | None, box: Box) -> InputNoise | Non
         raise InputError("input noise is given, but all variables are choices, which carry none; leave it out.")
     if noise.varies:
         raise InputError("input noise varies from place to place, and some variables are choices; give constants.")
+    if isinstance(noise.kind, Samples):
+        errors = np.zeros((len(noise.kind.errors), box.dimension))
+        errors[:, [box.names.index(name) for name in numbers.names]] = noise.kind.errors
+        return InputNoise.samples(errors)
     covariance = noise.unit_covariance(numbers)
     if np.any(covariance != np.diag(np.diag(covariance))):
         raise InputError("input noise is correlated, and some variables are choices; give standard deviations.")

@@ -100,6 +100,8 @@ def strategy_named(
     if averse:
         strategy = RiskAverse(ranking, float(kappa), trust_region)
     elif name.base == "thompson":
+        if trust_region is not None:
+            raise InputError(f"criterion '{criterion}' knows no trust region; leave one of them out.")
         strategy = Thompson(ranking, exactly)
     else:
         strategy = ExpectedImprovement(ranking, name, float(kappa), trust_region)

@@ -136,7 +136,10 @@ class DescribedGrasp(GraspOptions, total=False):
         Sequence[str], GraspOption(("dx", "dy"), f"Free variables, of {','.join(VARIABLES)}.", text=list)
     ]
     unit: Annotated[str, GraspOption("", "Unit of a mesh file or a cloud: mm, cm, m or in.")]
-    mass: Annotated[float | None, GraspOption(None, "Mass of a mesh [kg]; by default that of water.", text=float)]
+    mass: Annotated[
+        float | None,
+        GraspOption(None, "Mass of a mesh or a cloud [kg]; by default that of water.", text=float),
+    ]
     frame: Annotated[str | None, GraspOption(None, "Axes of a mesh's box: file, principal, or auto (the smaller).")]
     hand_config: Annotated[str, GraspOption("", "YAML description of a hand's model file: palm, fingers, preshapes.")]
     cloud: Annotated[str, GraspOption("", "Point cloud of the object instead: .ply, .pcd, .xyz or .npz.")]

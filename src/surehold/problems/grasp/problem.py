@@ -79,7 +79,7 @@ class GraspProblem:
     box : Box of the free variables
     units : tuple of their units, "m" or "rad"
     averaged : whether the value is the mean over the draws of an object of unknown shape
-    default : standoff and s1 of the default pose and how they were found
+    default : standoff and s1 of the default pose
 
     Raises
     ------
