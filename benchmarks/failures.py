@@ -8,9 +8,9 @@ Problems (maximized, exact, known optima)
     mostly    95 % of the box fail; inside the rest, a disc, a hill off its center
     chance    no place fails, but every trial does with probability 0.2
 Reported: evaluations until a trial is within 1 % of the optimum (of the range from the mean over all places that can
-succeed to the optimum; median, mean and standard error), the budget where it never is; how many runs that are ("never");
-and the median and the largest of the final regret in that unit. On the first and the last problem "none" stands beside
-the rules: what is needed where nothing fails, of which a better rule cannot need less.
+succeed to the optimum; median, mean and standard error), the budget where it never is; how many runs that are
+("never"); and the median and the largest of the final regret in that unit. On the first and the last problem "none"
+stands beside the rules: what is needed where nothing fails, of which a better rule cannot need less.
 
 Constants were chosen on seeds from 100 on; the tables in the documentation are of seeds from 0 on.
 """
