@@ -211,7 +211,6 @@ def test_a_whole_run_takes_outputs_and_survives_missing_ones():
         ({"feasible": 1.0}, "feasible is 1.0"),
         ({"feasible": True}, "feasible is True"),
         ({"safety": 0.0}, "safety is 0.0"),
-        ({"safety": 0.9, "n_initial": 20, "initial_points": [[0.5, 0.5]]}, "leave n_initial out"),
         ({"constraints": {"c": (None, 1.0)}, "preset": "thesis"}, "knows no constraints"),
         ({"allowed": "x1 <= 0.5", "initial_points": [[0.7, 0.1]]}, "which is not allowed"),
     ],

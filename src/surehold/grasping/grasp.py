@@ -25,9 +25,7 @@ class Grasp:
     """Outcome of one trial. Points and normals are in the frame of the object."""
 
     status: Status  #: see `STATUSES`
-    quality: (
-        float  #: the measure asked for; without two contacts 0, or below of signed_epsilon; a collision's 0 or below
-    )
+    quality: float  #: the measure asked for; without two contacts 0, less of signed_epsilon; a collision's 0 or less
     pose: Pose  #: from the palm frame to the object's frame
     s1: float | tuple[float, ...]  #: posture variable [rad]; all amplitudes of a preshape that has several
     joints: Array = field(

@@ -98,8 +98,6 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     first = initial_inputs(box, s.initial_points)
     wanted = default_n_initial(box, len(box.variables) - len(s.fixed or ())) if s.n_initial is None else s.n_initial
     wanted = whole_number("n_initial", wanted, 1)
-    if s.safety is not None and s.n_initial is not None:
-        raise InputError("with safety= the initial design is initial_points=, which are trusted; leave n_initial out.")
     n_initial = len(first) if s.safety is not None else max(wanted, len(first))
     told = s.noise == "told"
     thesis = None if s.preset is None else thesis_preset(s.preset)

@@ -73,7 +73,7 @@ class Optimizer(Record):
         "robust_log_ei" with input noise; in the thesis presets "ei" and "uei".
     n_initial
         Trials of the initial design; by default 5 for each of the d variables that are not fixed, at least
-        6 and at most 20 + d/5.
+        6 and at most 20 + d/5. With `safety` the `initial_points` alone.
     initial_points
         Points to be tried first, (i, d) or a list of whatever `tell` takes as x; they count as trials of the initial
         design, whose rest follows.
