@@ -57,8 +57,7 @@ class RandomEmbedding:
     """
 
     def __init__(self, box: Box, dimension: int, *, embeddings: int = 1, seed: int = 0, **settings: Any):
-        _check(box, dimension, settings)
-        whole_number("seed", seed, 0)
+        _check(box, dimension, seed, settings)
         self.box: Final = box
         self._asked: list[tuple[NDArray[np.float64], int, NDArray[np.float64]]] = []
         self._told: list[tuple[NDArray[np.float64], float]] = []
@@ -117,8 +116,7 @@ class NestedEmbedding:
 
     def __init__(self, box: Box, trials: int, dimension: int | None = None, *, seed: int = 0, **settings: Any):
         dimension = min(_FIRST_BINS, box.dimension) if dimension is None else dimension
-        _check(box, dimension, settings)
-        whole_number("seed", seed, 0)
+        _check(box, dimension, seed, settings)
         self.box: Final = box
         self._settings: Final = {"trust_region": True, **settings}
         self._seed: Final = seed
@@ -187,13 +185,14 @@ class NestedEmbedding:
         return Optimizer(inner, seed=self._seed, **self._settings)
 
 
-def _check(box: Box, dimension: int, settings: dict[str, Any]) -> None:
+def _check(box: Box, dimension: int, seed: int, settings: dict[str, Any]) -> None:
     if not isinstance(box, Box):
         raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
     if not box.plain:
         raise InputError(f"{box!r} has logarithms, whole numbers or choices; an embedding is of plain intervals.")
     if isinstance(dimension, bool) or not isinstance(dimension, int) or not 1 <= dimension <= box.dimension:
         raise InputError(f"dimension is {dimension!r}; give 1 to {box.dimension}, the number of variables.")
+    whole_number("seed", seed, 0)
     for name in ("input_noise", "fixed", "initial_points", "allowed"):
         if settings.get(name) is not None:
             raise InputError(f"{name} is about the variables of the box, not of an embedding; leave it out.")

@@ -137,10 +137,10 @@ class RobustGenerator(Generator):
             if value is None or not abs(value) <= LARGEST:
                 self.optimizer.tell(place, failed=True)
             else:
-                outputs = {name: result.get(name) for name in self.vocs.constraints}
-                if missing := [name for name, output in outputs.items() if output is None]:
+                names = list(self.vocs.constraints)
+                if missing := [name for name in names if result.get(name) is None]:
                     raise InputError(f"point {number!r} lacks {', '.join(missing)}; give every constraint its value.")
-                told = {n: v if abs(v or 0.0) <= LARGEST_SQUARED else None for n, v in outputs.items()}
+                told = {name: result[name] if abs(result[name]) <= LARGEST_SQUARED else None for name in names}
                 self.optimizer.tell(place, float(value), constraints=told or None)
             if isinstance(place, AskedTrial):
                 del self._asked[place.number]
