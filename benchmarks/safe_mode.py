@@ -8,7 +8,7 @@ its standard error over runs, the largest miss, and the mean of the best respons
 1 - safety.
 
     default       as it is
-    rough models  without particles of the squared-exponential process (`benchmarks.smooth_model`)
+    rough models  without particles of the squared-exponential process (`benchmarks.default_models`)
 """
 
 import argparse
@@ -18,7 +18,7 @@ from scipy.stats import qmc
 
 import surehold as sh
 from benchmarks.calibration import random_function
-from benchmarks.smooth_model import searching
+from benchmarks.default_models import searching
 
 TRIALS = {"straight": 9, "one variable": 12, "two variables": 12}
 
@@ -58,7 +58,7 @@ def main():
     arguments = parser.parse_args()
     for name in TRIALS:
         for variant, title in (("without", "rough models"), ("default", "default")):
-            with searching(variant):
+            with searching(variant, "smooth"):
                 runs = [run(name, seed, arguments.safety) for seed in range(arguments.seeds)]
             missed = np.array([of for of, _ in runs])
             shares = np.mean(missed > 0.0, axis=1)

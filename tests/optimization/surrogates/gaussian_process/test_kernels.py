@@ -6,6 +6,7 @@ from sklearn.gaussian_process.kernels import RBF, Matern
 from surehold.errors import InputError
 from surehold.optimization.surrogates.gaussian_process.kernels import (
     KERNELS,
+    LOG_ADDITIVE,
     along,
     correlation,
     correlation_and_factor,
@@ -37,16 +38,40 @@ class TwoScales:
         return (1.0 - SHARE) * long(X, Q) + SHARE * short(X, Q)
 
 
+class Additive:
+    """The sum of scikit-learn's kernels of one variable each, and one of all of them."""
+
+    def __init__(self, scales):
+        self._scales = scales
+
+    def __call__(self, X, Q):
+        parts = [Matern(s, nu=2.5)(X[:, k : k + 1], Q[:, k : k + 1]) for k, s in enumerate(self._scales)]
+        return (1.0 - SHARE) * np.mean(parts, axis=0) + SHARE * Matern(self._scales / PROPORTION, nu=2.5)(X, Q)
+
+
 REFERENCE = {
     "matern52": lambda scales: Matern(scales, nu=2.5),
     "matern32": lambda scales: Matern(scales, nu=1.5),
     "squared_exponential": lambda scales: RBF(scales),
     "matern52_product": Product,
-    "matern52_two_scales": lambda scales: TwoScales(scales),
+    "matern52_two_scales": TwoScales,
+    "additive": Additive,
 }
 PROPORTION, SHARE = 7.0, 0.3
 #: what else the scales of a kernel hold
-SHAPE = {"matern52_two_scales": (PROPORTION, SHARE)}
+SHAPE = {
+    "matern52_two_scales": (PROPORTION, SHARE),
+    "additive": (PROPORTION * np.exp(LOG_ADDITIVE), SHARE),
+}
+
+
+def kernel_of(name):
+    """Return the name by which the compiled functions know it: a sum is a form of two scales."""
+    return "matern52_two_scales" if name == "additive" else name
+
+
+def correlation_of(name, X, Q, scales):
+    return correlation(kernel_of(name), X, Q, scales, *SHAPE.get(name, ()))
 
 
 @pytest.fixture
@@ -58,61 +83,58 @@ def points():
 @pytest.mark.parametrize("name", REFERENCE)
 def test_equal_to_scikit_learn(name, points):
     X, Q, scales = points
-    np.testing.assert_allclose(
-        correlation(name, X, Q, scales, *SHAPE.get(name, ())), REFERENCE[name](scales)(X, Q), atol=1e-14
-    )
+    np.testing.assert_allclose(correlation_of(name, X, Q, scales), REFERENCE[name](scales)(X, Q), atol=1e-14)
 
 
-@pytest.mark.parametrize("name", KERNELS)
+@pytest.mark.parametrize("name", REFERENCE)
 def test_self_correlation_is_the_cross_correlation(name, points):
     X, _, scales = points
     out = np.empty((9, 9))
-    self_correlation(kernel_number(name), X, np.append(1.0 / scales, SHAPE.get(name, ())), out)
+    self_correlation(kernel_number(kernel_of(name)), X, np.append(1.0 / scales, SHAPE.get(name, ())), out)
     full = np.tril(out) + np.tril(out, -1).T
-    np.testing.assert_allclose(full, correlation(name, X, X, scales, *SHAPE.get(name, ())), atol=1e-15)
+    np.testing.assert_allclose(full, correlation_of(name, X, X, scales), atol=1e-15)
 
 
-@pytest.mark.parametrize("name", KERNELS)
+@pytest.mark.parametrize("name", REFERENCE)
 def test_symmetric_positive_and_one_at_home(name, points):
     X, _, scales = points
-    C = correlation(name, X, X, scales, *SHAPE.get(name, ()))
+    C = correlation_of(name, X, X, scales)
     np.testing.assert_allclose(C, C.T, atol=1e-16)
     np.testing.assert_allclose(np.diag(C), 1.0, atol=1e-15)
     assert np.linalg.eigvalsh(C).min() > 0.0
 
 
-@pytest.mark.parametrize("name", KERNELS)
+@pytest.mark.parametrize("name", REFERENCE)
 def test_far_points_are_uncorrelated_without_overflow(name):
-    far = correlation(name, [[0.0]], [[1.0], [1e8], [1e150]], np.array([1e-9]), *SHAPE.get(name, ()))
+    far = correlation_of(name, [[0.0]], [[1.0], [1e8], [1e150]], np.array([1e-9]))
     assert np.all((far >= 0.0) & (far < 1e-250))
 
 
 @pytest.mark.parametrize("name", REFERENCE)
 def test_factor_gives_both_derivatives(name, points):
     X, Q, scales = points
-    out, factor = np.empty((9, 5)), np.empty((9, 5))
-    shape = SHAPE.get(name, ())
-    correlation_and_factor(kernel_number(name), X, Q, np.append(1.0 / scales, shape), out, factor)
-    np.testing.assert_allclose(out, correlation(name, X, Q, scales, *SHAPE.get(name, ())), atol=1e-15)
+    out, factor, room = np.empty((3, 9, 5))
+    number, inverse = kernel_number(kernel_of(name)), np.append(1.0 / scales, SHAPE.get(name, ()))
+    correlation_and_factor(number, X, Q, inverse, out, factor)
+    np.testing.assert_allclose(out, correlation_of(name, X, Q, scales), atol=1e-15)
     h = 1e-6
     for k in range(3):
         step = h * np.eye(3)[k]
-        numeric = (correlation(name, X, Q + step, scales, *shape) - correlation(name, X, Q - step, scales, *shape)) / (
-            2 * h
-        )
+        numeric = (correlation_of(name, X, Q + step, scales) - correlation_of(name, X, Q - step, scales)) / (2 * h)
         t = Q[None, :, k] - X[:, None, k]
-        share = np.vectorize(along)(kernel_number(name), t, 1.0 / scales[k])
-        np.testing.assert_allclose(-factor * share * t / scales[k] ** 2, numeric, atol=1e-8)
+        row = np.ascontiguousarray(Q[:, k])
+        g = np.array([along(number, X[i, k], row, inverse, k, factor[i], room[i]) for i in range(len(X))])
+        np.testing.assert_allclose(-g * t / scales[k] ** 2, numeric, atol=1e-8)
         up, down = scales * np.exp(step), scales * np.exp(-step)
-        numeric = (correlation(name, X, Q, up, *shape) - correlation(name, X, Q, down, *shape)) / (2 * h)
-        np.testing.assert_allclose(factor * share * t**2 / scales[k] ** 2, numeric, atol=1e-8)
+        numeric = (correlation_of(name, X, Q, up) - correlation_of(name, X, Q, down)) / (2 * h)
+        np.testing.assert_allclose(g * t**2 / scales[k] ** 2, numeric, atol=1e-8)
 
 
 def test_factor_is_finite_at_zero_distance():
-    for name in KERNELS:
+    for name in REFERENCE:
         out, factor = np.empty((1, 1)), np.empty((1, 1))
         scales = np.append(np.ones(2), SHAPE.get(name, ()))
-        correlation_and_factor(kernel_number(name), np.zeros((1, 2)), np.zeros((1, 2)), scales, out, factor)
+        correlation_and_factor(kernel_number(kernel_of(name)), np.zeros((1, 2)), np.zeros((1, 2)), scales, out, factor)
         assert out[0, 0] == pytest.approx(1.0, abs=1e-15)
         assert np.isfinite(factor[0, 0])
 
@@ -122,15 +144,23 @@ def test_unknown_kernel():
         correlation("matern", [[0.0]], [[0.0]], np.ones(1))
 
 
-def test_derivatives_by_the_shape_of_two_scales(points):
+@pytest.mark.parametrize("name", SHAPE)
+def test_derivatives_by_the_shape_of_two_scales(name, points):
     X, Q, scales = points
+    proportion, share = SHAPE[name]
     squared = np.sum(((X[:, None] - Q) / scales) ** 2, axis=2)
-    by_proportion, by_share = np.vectorize(two_scale_slopes)(squared, PROPORTION, SHARE)
-    h, name = 1e-6, "matern52_two_scales"
-    up, down = (correlation(name, X, Q, scales, PROPORTION * np.exp(step), SHARE) for step in (h, -h))
+    by_proportion, by_share = np.vectorize(two_scale_slopes)(
+        squared, correlation_of(name, X, Q, scales), proportion, share
+    )
+    h, kernel = 1e-6, kernel_of(name)
+    up, down = (correlation(kernel, X, Q, scales, proportion * np.exp(step), share) for step in (h, -h))
     np.testing.assert_allclose(by_proportion, (up - down) / (2 * h), atol=1e-8)
-    up, down = (correlation(name, X, Q, scales, PROPORTION, expit(logit(SHARE) + step)) for step in (h, -h))
+    up, down = (correlation(kernel, X, Q, scales, proportion, expit(logit(share) + step)) for step in (h, -h))
     np.testing.assert_allclose(by_share, (up - down) / (2 * h), atol=1e-8)
+
+
+def test_every_kernel_has_a_reference():
+    assert {kernel_of(name) for name in REFERENCE} == set(KERNELS)
 
 
 def test_a_short_part_without_a_share_changes_no_bit(points):

@@ -6,7 +6,13 @@ from scipy.stats import norm
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
-from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, kernel_number, shape_size
+from surehold.optimization.surrogates.gaussian_process.kernels import (
+    KERNELS,
+    LOG_ADDITIVE,
+    TWO_SCALES,
+    kernel_number,
+    shape_size,
+)
 from surehold.optimization.surrogates.gaussian_process.likelihood import (
     Evidence,
     log_posterior,
@@ -88,9 +94,9 @@ def test_blocks_are_independent_and_weighted(data):
     assert abs(log_posterior(theta, blocks) - expected) < 1e-9
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize(("kernel", "form"), [*((name, 0.0) for name in KERNELS), (KERNELS[TWO_SCALES], LOG_ADDITIVE)])
 @pytest.mark.parametrize(("signal", "inferred"), [(False, False), (True, False), (False, True), (True, True)])
-def test_gradient(kernel, signal, inferred, data):
+def test_gradient(kernel, form, signal, inferred, data):
     X, y = data
     evidence = evidence_of(
         X,
@@ -104,7 +110,7 @@ def test_gradient(kernel, signal, inferred, data):
         offsets=[0, 15, 25],
         weights=[1.0, 0.6],
     )
-    shape = np.array([np.log(5.0), -1.0])[: shape_size(kernel_number(kernel))]
+    shape = np.array([form + np.log(5.0), -1.0])[: shape_size(kernel_number(kernel))]
     theta = np.concatenate([np.log([0.4, 0.9]), shape, np.log([2.0, 0.02])[: signal + inferred]])
     value, gradient = log_posterior_and_gradient(theta, evidence)
     assert value == pytest.approx(log_posterior(theta, evidence), abs=1e-9)

@@ -12,7 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.defaults import (
+    ADDITIVE_FROM,
+    ADDITIVE_UP_TO,
     BURN_IN,
+    INTERACTION_PRIOR,
     MODE_REACH,
     MODE_STARTS,
     MODE_TOLERANCES,
@@ -28,7 +31,12 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.samplers.elliptical_slice import elliptical_slice_sample
 from surehold.optimization.samplers.slice import slice_sample
 from surehold.optimization.surrogates.gaussian_process.curvature import root_of_covariance
-from surehold.optimization.surrogates.gaussian_process.kernels import TWO_SCALES, kernel_number, shape_size
+from surehold.optimization.surrogates.gaussian_process.kernels import (
+    LOG_ADDITIVE,
+    TWO_SCALES,
+    kernel_number,
+    shape_size,
+)
 from surehold.optimization.surrogates.gaussian_process.likelihood import (
     Evidence,
     log_posterior,
@@ -134,11 +142,13 @@ def learn(
 
 
 def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Generator) -> Learnt:
-    """Draw particles of three models, equally likely beforehand: one rough scale, one smooth scale, and two scales.
+    """Draw particles of several models, equally likely beforehand.
 
-    Each has as many particles as its evidence p(y | model) says (Laplace's method, MacKay 2003, section 27), so that
-    a function of one scale is modelled as if there were no second one, and one that all derivatives exist of (squared
-    exponential) as such.
+    They are one rough scale, one smooth scale, two scales, and, where variables are neither few nor many, a sum of
+    processes of one variable each with a share of one of all of them. Each has as many particles as its evidence
+    p(y | model) says (Laplace's method, MacKay 2003, section 27), so that a function of one scale is modelled as if
+    there were no second one, one that all derivatives exist of (squared exponential) as such, and one whose variables
+    do not interact is known where no trial has been.
     """
     d = evidence.X.shape[1]
     shape = [d, d + 1]
@@ -150,6 +160,11 @@ def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Ge
         "squared_exponential": _ABSENT,
     }
     models = [*(alone._replace(kernel=kernel_number(name)) for name in one_scale), evidence]
+    if ADDITIVE_FROM <= d <= ADDITIVE_UP_TO:
+        mean, deviation = evidence.prior_mean.copy(), evidence.prior_deviation.copy()
+        mean[d] = LOG_ADDITIVE  # in the median the short part is as long as the others
+        mean[d + 1], deviation[d + 1] = INTERACTION_PRIOR
+        models.append(evidence._replace(prior_mean=mean, prior_deviation=deviation))
     found = [mode(model) for model in models]
     known = [log_evidence_and_root(model, center) for model, (center, _) in zip(models, found, strict=True)]
     keep = shared_out(np.array([log for log, _ in known]), 1 if learning.method == "map" else learning.particles)

@@ -16,19 +16,23 @@ With g, every derivative that is needed has no singularity:
     squared exponential   c = exp(-rho^2 / 2),                            g = c
 (Rasmussen and Williams 2006, section 4.2.)
 
-The product form multiplies one-dimensional Matern-5/2 correlations c_i (thesis (3.2) as printed). There g stands for c
-itself, and both derivatives take the factor h_i = g_i / c_i of their dimension besides (`along`; 1 for the others):
-    Matern-5/2, product   c = prod_i (1 + r_i + r_i^2/3) exp(-r_i),  r_i = sqrt(5) |q_i - x_i| / l_i
+Two forms are made of one-dimensional Matern-5/2 correlations c_i with their factors g_i at r_i = sqrt(5) |q_i - x_i| /
+l_i. In both derivatives a factor of dimension i takes the place of g (`along`):
+    Matern-5/2, product   c = prod_i c_i (thesis (3.2) as printed),  g stands for c,  its factor is c g_i / c_i
+    additive              see below                                                  g + (1 - w) g_i / d
 
 The form of two scales is the sum of a long and a short process, independent of each other, whose length-scales are in
 one proportion a in all dimensions; w is the share of the short one:
     Matern-5/2, two scales  c = (1 - w) c_long(rho) + w c_long(a rho),  g = (1 - w) g_long(rho) + w a^2 g_long(a rho)
 Its scales (d + 2,) are the inverse length-scales followed by a and w; those of the others are the former (d,) alone.
 Where w is 0 the long process is alone, and a, which then says nothing else, says which one it is: squared exponential
-where a is 0, Matern-5/2 otherwise. So particles of all three can stand side by side.
+where a is 0, Matern-5/2 otherwise. Where a stands multiplied by e^50, the long process is a sum of independent ones, of
+one variable each (additive processes: Duvenaud, Nickisch and Rasmussen 2011; of first order here):
+    additive                c = (1 - w) / d sum_i c_i + w c_long(a rho),  g = w a^2 g_long(a rho)
+So particles of all four can stand side by side.
 """
 
-from math import sqrt
+from math import exp, sqrt
 from typing import Final
 
 import numpy as np
@@ -39,7 +43,9 @@ from surehold.store.kernels import njit
 
 __all__ = [
     "KERNELS",
+    "LOG_ADDITIVE",
     "TWO_SCALES",
+    "additive_share",
     "along",
     "correlation_and_factor",
     "correlations",
@@ -57,6 +63,9 @@ KERNELS: Final = ("matern52", "matern32", "squared_exponential", "matern52_produ
 _PRODUCT: Final = 3
 TWO_SCALES: Final = 4
 _NOTHING: Final = 1e-20  # a share that adds nothing in double precision; a proportion that is none
+LOG_ADDITIVE: Final = 50.0  # what log a exceeds the logarithm of the proportion by, where the long process is a sum
+_ADDITIVE: Final = exp(0.5 * LOG_ADDITIVE)  # beyond which a is of that kind
+_OF_ADDITIVE: Final = exp(-LOG_ADDITIVE)
 _SQRT3: Final = sqrt(3.0)
 _SQRT5: Final = sqrt(5.0)
 _FAR: Final = 700.0  # beyond this exponent a correlation is 0 in double precision
@@ -74,10 +83,23 @@ def shape_size(kernel: int) -> int:
     return 2 if kernel == TWO_SCALES else 0
 
 
+@njit(cache=True, inline="always")
+def additive_share(kernel, scales):
+    """Return the share (1 - w) / d of each process of one variable; 0 where the kernel has none."""
+    if kernel == TWO_SCALES and scales[-2] > _ADDITIVE:
+        return (1.0 - scales[-1]) / (scales.size - 2)
+    return 0.0
+
+
 @njit(cache=True, fastmath={"contract"})
 def _transform(kernel, squared, scales):
-    """Overwrite squared scaled distances (n,) with correlations c."""
-    if kernel == TWO_SCALES and scales[-1] >= _NOTHING:
+    """Overwrite squared scaled distances (n,) with correlations c; of additive ones with their short part."""
+    if additive_share(kernel, scales) > 0.0:
+        a, w = scales[-2] * _OF_ADDITIVE, scales[-1]
+        for i in range(squared.size):
+            s = min(a * (_SQRT5 * sqrt(squared[i])), _FAR)
+            squared[i] = w * ((1.0 + s + s * s / 3.0) * exponential(-s))
+    elif kernel == TWO_SCALES and scales[-1] >= _NOTHING:
         a, w = scales[-2], scales[-1]
         for i in range(squared.size):
             rho = _SQRT5 * sqrt(squared[i])
@@ -100,8 +122,15 @@ def _transform(kernel, squared, scales):
 
 @njit(cache=True, fastmath={"contract"})
 def _transform_with_factor(kernel, squared, factor, scales):
-    """Overwrite squared scaled distances (n,) with correlations c and fill `factor` (n,) with radial factors g."""
-    if kernel == TWO_SCALES and scales[-1] >= _NOTHING:
+    """Do as `_transform` does, and fill `factor` (n,) with radial factors g."""
+    if additive_share(kernel, scales) > 0.0:
+        a, w = scales[-2] * _OF_ADDITIVE, scales[-1]
+        for i in range(squared.size):
+            s = min(a * (_SQRT5 * sqrt(squared[i])), _FAR)
+            e = w * exponential(-s)
+            squared[i] = (1.0 + s + s * s / 3.0) * e
+            factor[i] = 5.0 / 3.0 * a * a * (1.0 + s) * e
+    elif kernel == TWO_SCALES and scales[-1] >= _NOTHING:
         a, w = scales[-2], scales[-1]
         for i in range(squared.size):
             rho = _SQRT5 * sqrt(squared[i])
@@ -158,13 +187,35 @@ def _products(x, Z, inverse_l, out):
             out[j] *= (1.0 + r + r * r / 3.0) * exponential(-r)
 
 
-@njit(cache=True, inline="always")
-def along(kernel, difference, scale):
-    """Return the factor h of the module's legend for one dimension: coordinates' difference, inverse length-scale."""
-    if kernel != _PRODUCT:
-        return 1.0
-    r = _SQRT5 * abs(difference) * scale
-    return 5.0 * (1.0 + r) / (3.0 + 3.0 * r + r * r)
+@njit(cache=True, fastmath={"contract"})
+def _add_sums(x, Z, inverse_l, share, out):
+    """Add share times the sum of one-dimensional correlations of x (d,) with columns of Z (d, q) to `out` (q,)."""
+    for k in range(x.size):
+        scale = _SQRT5 * inverse_l[k]
+        for j in range(out.size):
+            r = min(abs(x[k] - Z[k, j]) * scale, _FAR)
+            out[j] += share * ((1.0 + r + r * r / 3.0) * exponential(-r))
+
+
+@njit(cache=True, fastmath={"contract"})
+def along(kernel, z, row, scales, k, factor, room):
+    """Return the factor (q,) of dimension k in the derivatives, see the module's legend.
+
+    z is coordinate k of a point, `row` (q,) that of others; factor (q,) is g, and is returned itself by kernels whose
+    dimensions share it; others fill `room` (q,).
+    """
+    share, scale = additive_share(kernel, scales), _SQRT5 * scales[k]
+    if share > 0.0:
+        for j in range(factor.size):
+            r = min(abs(z - row[j]) * scale, _FAR)
+            room[j] = factor[j] + share * (5.0 / 3.0 * (1.0 + r) * exponential(-r))
+    elif kernel == _PRODUCT:
+        for j in range(factor.size):
+            r = abs(z - row[j]) * scale
+            room[j] = factor[j] * (5.0 * (1.0 + r) / (3.0 + 3.0 * r + r * r))
+    else:
+        return factor
+    return room
 
 
 @njit(cache=True)
@@ -185,6 +236,9 @@ def correlations(kernel, x, Z, inverse_l, out):
     else:
         _squared_distances(x, Z, inverse_l, out)
         _transform(kernel, out, inverse_l)
+        share = additive_share(kernel, inverse_l)
+        if share > 0.0:
+            _add_sums(x, Z, inverse_l, share, out)
 
 
 @njit(cache=True)
@@ -197,6 +251,9 @@ def correlations_and_factors(kernel, x, Z, inverse_l, out, factor):
     else:
         _squared_distances(x, Z, inverse_l, out)
         _transform_with_factor(kernel, out, factor, inverse_l)
+        share = additive_share(kernel, inverse_l)
+        if share > 0.0:
+            _add_sums(x, Z, inverse_l, share, out)
 
 
 @njit(cache=True)
@@ -233,9 +290,13 @@ def correlation_and_factor(kernel, X, Q, inverse_l, out, factor):
 
 
 @njit(cache=True)
-def two_scale_slopes(squared, a, w):
-    """Return the derivatives of the correlation of two scales by log a and by log(w / (1 - w)), at rho^2 = squared."""
+def two_scale_slopes(squared, c, a, w):
+    """Return the derivatives of a correlation c of two scales by log a and by log(w / (1 - w)), at rho^2 = squared."""
     rho = _SQRT5 * sqrt(squared)
+    if a > _ADDITIVE:
+        s = min(a * _OF_ADDITIVE * rho, _FAR)
+        short = (1.0 + s + s * s / 3.0) * exponential(-s)
+        return -w * s * s / 3.0 * (1.0 + s) * exponential(-s), w * (short - c)
     r, s = min(rho, _FAR), min(a * rho, _FAR)
     short = (1.0 + s + s * s / 3.0) * exponential(-s)
     long = (1.0 + r + r * r / 3.0) * exponential(-r)

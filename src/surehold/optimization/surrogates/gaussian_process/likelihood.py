@@ -190,15 +190,13 @@ def log_posterior(theta, evidence):
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _weighted_squares(kernel, x, Z, inverse_l, weights, gradient):
-    """Add the sums over j of weights h (x_k - Z_kj)^2 / l_k^2, for x (d,) and Z (d, q), to `gradient` (d,)."""
-    for k in range(x.size):
-        scale = inverse_l[k]
-        t = 0.0
-        for j in range(weights.size):
-            step = x[k] - Z[k, j]
-            t += weights[j] * along(kernel, step, scale) * (step * step)
-        gradient[k] += t * scale * scale
+def _add_weighted_squares(z, row, scale, weights, gradient, k):
+    """Add the sum over j of weights (z - row_j)^2 scale^2, for z, scale and row, weights (q,), to gradient[k]."""
+    t = 0.0
+    for j in range(weights.size):
+        step = z - row[j]
+        t += weights[j] * (step * step)
+    gradient[k] += t * scale * scale
 
 
 @njit(cache=True)
@@ -228,22 +226,26 @@ def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel,
     A_inverse = L  # not needed any more
     gram_of_lower(inverse, A_inverse)
     Z = transposed(X)
-    weights = np.empty(n)
+    weights, weighted, room = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):  # 1/2 tr((alpha alpha' - A^-1) dA/dtheta), GPML (5.9)
         by_signal = 0.0
         for j in range(i):
             w = (alpha[i] * alpha[j] - A_inverse[i, j]) * s2  # the two symmetric entries together
             by_signal += w * C[i, j]
-            weights[j] = w * factor[i, j]
+            weights[j] = w
             if kernel == TWO_SCALES:
                 squared = 0.0
                 for k in range(d):
                     t = (X[i, k] - X[j, k]) * inverse_l[k]
                     squared += t * t
-                by_proportion, by_share = two_scale_slopes(squared, inverse_l[d], inverse_l[d + 1])
+                by_proportion, by_share = two_scale_slopes(squared, C[i, j], inverse_l[d], inverse_l[d + 1])
                 gradient[d + 2] += w * by_proportion
                 gradient[d + 3] += w * by_share
-        _weighted_squares(kernel, X[i], Z, inverse_l, weights[:i], gradient)
+        for k in range(d):
+            g = along(kernel, X[i, k], Z[k, :i], inverse_l, k, factor[i, :i], room[:i])
+            for j in range(i):
+                weighted[j] = weights[j] * g[j]
+            _add_weighted_squares(X[i, k], Z[k, :i], inverse_l[k], weighted[:i], gradient, k)
         w = 0.5 * (alpha[i] * alpha[i] - A_inverse[i, i])
         gradient[d] += by_signal + w * s2 * (1.0 + ratio)
         gradient[d + 1] += w * v

@@ -75,16 +75,15 @@ def _add(row, factor, sums):
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _slopes(kernel, factor, z, Z, k, scale, first, second):
-    """Return the sums over trials a of -g_a (z - Z_ka) times first (n,), and times second (n,).
+def _slopes(factor, z, row, first, second):
+    """Return the sums over trials a of -g_a (z - row_a) times first (n,), and times second (n,).
 
-    factor (n,) are the radial factors g, z is coordinate k of the point, Z (d, n) are the trials, scale is the inverse
-    length-scale of dimension k.
+    factor (n,) are the factors g of a dimension, z is that coordinate of the point, row (n,) that of the trials.
     """
     t = u = 0.0
     for a in range(factor.size):
-        step = Z[k, a] - z
-        slope = factor[a] * along(kernel, step, scale) * step
+        step = row[a] - z
+        slope = factor[a] * step
         t += slope * first[a]
         u += slope * second[a]
     return t, u
@@ -102,6 +101,7 @@ def prior_variance(offsets, slopes, weights, inverse_l, s2, mean_variance, kerne
     variance_gradient = np.zeros((m, b if gradient else 0, d))
     own = np.empty((s, s))
     own_factor = np.empty((s, s))
+    room = np.empty(s)
     for i in range(b):
         xi = offsets[i]
         Z = transposed(xi)
@@ -122,10 +122,10 @@ def prior_variance(offsets, slopes, weights, inverse_l, s2, mean_variance, kerne
                 for k in range(d):
                     t = 0.0
                     for w in range(s):
+                        g = along(kernel, xi[w, k], Z[k, :w], inverse_l[j], k, own_factor[w, :w], room[:w])
                         for o in range(w):
-                            step = xi[w, k] - xi[o, k]
-                            step *= (slopes[i, w, k] - slopes[i, o, k]) * along(kernel, step, inverse_l[j, k])
-                            t -= 2.0 * weights[w] * weights[o] * own_factor[w, o] * step
+                            step = (xi[w, k] - xi[o, k]) * (slopes[i, w, k] - slopes[i, o, k])
+                            t -= 2.0 * weights[w] * weights[o] * g[o] * step
                     variance_gradient[j, i, k] = s2[j] * t * inverse_l[j, k] ** 2
     return variance, variance_gradient
 
@@ -180,7 +180,8 @@ def average(Q, offsets, slopes, weights, prior, X, inverse_l, s2, mean_variance,
                 for w in range(s):
                     for k in range(d):
                         scale = inverse_l[j, k]
-                        t, u = _slopes(kernel, F[i, w], points[i, w, k], Z, k, scale, alpha[j], W[i])
+                        g = along(kernel, points[i, w, k], Z[k], inverse_l[j], k, F[i, w], C)
+                        t, u = _slopes(g, points[i, w, k], Z[k], alpha[j], W[i])
                         rate = s2[j] * scale**2 * weights[w] * slopes[min(i, last), w, k]
                         mean_gradient[j, i, k] += rate * t
                         variance_gradient[j, i, k] -= 2.0 * rate * u

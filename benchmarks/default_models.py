@@ -1,34 +1,39 @@
-"""What the smooth one of the default's three models gains: `python -m benchmarks.smooth_model landscapes`.
+"""What one of the default's models gains: `python -m benchmarks.default_models landscapes --without sums`.
 
     landscapes  training seeds of `benchmarks.generated_landscapes`, one to eight variables, all kinds of noise; final
                 regret [%] of all, by number of variables and by shape. `--rows FILE` keeps the runs, and those that it
                 holds are not made again; with `--count 0` all of them are printed
+    separable   seeds of `benchmarks.separable_functions`, four to eight variables, with noise or none; regret [%] at
+                half and full budget, `--rows` likewise
     robust      functions of `benchmarks.robust_regret` (`--names`), seeds 200 to 229; final regret [%]
     smooth      functions of `benchmarks.smooth_regret` (`--names`) without noise, seeds 10 to 29; logarithms of the
                 regret at half and full budget
     time        no search: CPU milliseconds of an ask with its learning, after 50 and 140 trials in two variables and
                 150 in seven, with input noise and without; medians of 9, the two in turns
 
-Of each problem a run of the default, and one whose model has no particles of the squared-exponential process, with the
-same initial design. Printed are means with standard errors, the paired difference and, of regrets in per cent, runs
-within 1 %, the difference of the logarithm (base 10; regrets below 0.01 % count as that), and how many runs come within
-1 % with the smooth model that do not without it, and the other way round.
+Of each problem a run of the default, and one whose model has no particles of the model that is named: `smooth`, the
+squared-exponential process, or `sums` of processes of one variable, from four variables on; with the same initial
+design. Printed are means with standard errors, the paired difference and, of regrets in per cent, runs within 1 %, the
+difference of the logarithm (base 10; regrets below 0.01 % count as that), and how many runs come within 1 % with the
+model that do not without it, and the other way round.
 """
 
 import argparse
 import json
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from unittest import mock
 
 import numpy as np
+from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 import surehold as sh
 from benchmarks import robust_regret, smooth_regret
-from benchmarks.generated_landscapes import BUDGETS, SHAPES, TRAINING, landscape
+from benchmarks.generated_landscapes import BUDGETS, SHAPES, landscape
 from benchmarks.search_variants import begun, regret
+from benchmarks.separable_functions import separable
 from surehold.optimization.surrogates.gaussian_process import hyperparameters
 from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
 
@@ -37,16 +42,23 @@ GROUPS = {"all": (1, 8), "1-3 variables": (1, 3), "4-6 variables": (4, 6), "7-8 
 LEAST = 0.01
 SMOOTH = kernel_number("squared_exponential")
 #: subject -> (first seed, number of seeds)
-SEEDS = {"landscapes": (330, 117), "robust": (200, 30), "smooth": (10, 20), "time": (0, 9)}
+SEEDS = {"landscapes": (330, 117), "separable": (30, 60), "robust": (200, 30), "smooth": (10, 20), "time": (0, 9)}
 NAMES = {
     "robust": ["needle-3", "many", "gm 0.02", "gm 0.01", "ridge"],
     "smooth": [name for name in smooth_regret.FUNCTIONS if not name.endswith("-wide")],
 }
+SEPARABLE = {
+    "all": lambda problem: True,
+    "sums": lambda problem: problem.form == "sum",
+    "products": lambda problem: problem.form == "product",
+    "exact": lambda problem: problem.noise is None,
+    "under noise": lambda problem: problem.noise is not None,
+}
 
 
 @contextmanager
-def searching(variant):
-    """Run the body with the default's model as it is or, for "without", without learning the smooth process at all."""
+def searching(variant, model):
+    """Run the body with the default as it is or, for "without", without learning a model, smooth or sums, at all."""
     learns, weighs = hyperparameters.mode, hyperparameters.log_evidence_and_root
 
     def mode(evidence):
@@ -55,11 +67,12 @@ def searching(variant):
     def log_evidence_and_root(evidence, center):
         return (np.nan, np.eye(center.size)) if evidence.kernel == SMOOTH else weighs(evidence, center)
 
-    if variant == "default":
+    changed = {
+        "smooth": {"mode": mode, "log_evidence_and_root": log_evidence_and_root},
+        "sums": {"ADDITIVE_FROM": np.inf},
+    }
+    with mock.patch.multiple(hyperparameters, **changed[model]) if variant == "without" else nullcontext():
         yield
-    else:
-        with mock.patch.multiple(hyperparameters, mode=mode, log_evidence_and_root=log_evidence_and_root):
-            yield
 
 
 def on_landscape(seed):
@@ -69,6 +82,22 @@ def on_landscape(seed):
         x = np.clip(design.pop(0) if design else optimizer.ask(), 0.0, 1.0)
         optimizer.tell(x, problem(x))
     return regret(problem, optimizer.recommend().x)
+
+
+def on_separable(seed):
+    """Return the regrets [%] at half and full budget on the function of a seed."""
+    problem = separable(seed)
+    n_initial = sh.Optimizer.default_n_initial(problem.box)
+    design = qmc.LatinHypercube(problem.dimension, rng=np.random.default_rng([seed, 0, 98])).random(n_initial)
+    optimizer = sh.Optimizer(problem.box, n_initial=n_initial, seed=0, input_noise=problem.noise)
+    answers = []
+    for i in range(problem.budget):
+        x = np.clip(design[i] if i < n_initial else optimizer.ask(), 0.0, 1.0)
+        optimizer.tell(x, problem(x))
+        if i + 1 in (problem.budget // 2, problem.budget):
+            answers.append(optimizer.recommend().x)
+    best, scale = problem.best()
+    return (100.0 * (best - problem.expectation(np.array(answers))) / scale).tolist()
 
 
 def on_robust(name, seed):
@@ -93,59 +122,71 @@ def ask_seconds(n, d, noise, seed):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("subject", choices=list(SEEDS))
+    parser.add_argument("--without", choices=("smooth", "sums"), default="sums", help="model that the one run lacks")
     parser.add_argument("--first", type=int, help="first seed, or its number in the set")
     parser.add_argument("--count", type=int, help="seeds")
     parser.add_argument("--names", nargs="+", help="functions, of robust and smooth")
-    parser.add_argument("--rows", type=Path, help="file of the runs on landscapes, a line each")
+    parser.add_argument("--rows", type=Path, help="file of the runs on landscapes or separable functions, a line each")
     arguments = parser.parse_args()
-    subject = arguments.subject
+    subject, model = arguments.subject, arguments.without
     first, count = (
         usual if given is None else given
         for usual, given in zip(SEEDS[subject], (arguments.first, arguments.count), strict=True)
     )
+    seeds = range(first, first + count)
     with threadpool_limits(1):
         if subject == "time":
-            _print_times(range(first, first + count))
+            _print_times(model, seeds)
         elif subject == "landscapes":
-            _print_landscapes(TRAINING[first : first + count], arguments.rows)
+            found = _kept(on_landscape, model, seeds, arguments.rows)
+            for name, members in _groups(sorted(found)).items():
+                if len(members) > 1:
+                    _print_regrets(name, *np.array([found[seed] for seed in members]).T)
+        elif subject == "separable":
+            found = _kept(on_separable, model, seeds, arguments.rows)
+            for name, chosen in SEPARABLE.items():
+                pairs = np.array([found[seed] for seed in sorted(found) if chosen(separable(seed))])  # (n, 2, 2)
+                if len(pairs) > 1:
+                    _print_regrets(f"{name}, half", *pairs[:, :, 0].T)
+                    _print_regrets(f"{name}, full", *pairs[:, :, 1].T)
         else:
             for name in arguments.names or NAMES[subject]:
-                _print_function(subject, name, range(first, first + count))
+                _print_function(subject, model, name, seeds)
 
 
-def _print_times(seeds):
+def _print_times(model, seeds):
     for n, d in ((50, 2), (140, 2), (150, 7)):
         for noise, title in ((None, "without noise"), (sh.InputNoise.unit(0.03), "under noise")):
             taken = {variant: [] for variant in VARIANTS}
             for seed in (0, *seeds):  # the first one compiles
                 for variant in VARIANTS:
-                    with searching(variant):
+                    with searching(variant, model):
                         taken[variant].append(ask_seconds(n, d, noise, seed))
             before, now = (1000.0 * np.median(taken[variant][1:]) for variant in VARIANTS)
             print(f"({n}, {d}) {title:13}  without {before:.1f} ms, with {now:.1f} ms, {now / before:.2f} times")
 
 
-def _print_landscapes(seeds, file):
+def _kept(run, model, seeds, file):
+    """Return {seed: what the run of each variant found}, those of a file included."""
     known = {}
     if file is not None and file.exists():
         known = {(seed, variant): found for seed, variant, found in map(json.loads, file.open())}
     for seed in seeds:
         for variant in VARIANTS:
             if (seed, variant) not in known:
-                with searching(variant):
-                    known[seed, variant] = on_landscape(seed)
+                with searching(variant, model):
+                    known[seed, variant] = run(seed)
                 if file is not None:
                     with file.open("a") as kept:
                         print(json.dumps([seed, variant, known[seed, variant]]), file=kept)
-    for name, members in _groups(seeds or sorted({seed for seed, _ in known})).items():
-        if len(members) > 1:
-            _print_regrets(name, *(np.array([known[seed, variant] for seed in members]) for variant in VARIANTS))
+    wanted = seeds or {seed for seed, _ in known}
+    return {seed: [known[seed, variant] for variant in VARIANTS] for seed in wanted}
 
 
-def _print_function(subject, name, seeds):
+def _print_function(subject, model, name, seeds):
     found = []
     for variant in VARIANTS:
-        with searching(variant):
+        with searching(variant, model):
             if subject == "robust":
                 found.append(np.array([on_robust(name, seed) for seed in seeds]))
             else:
@@ -168,7 +209,7 @@ def _print_regrets(name, before, now):
     logarithm = np.log10(np.maximum(now, LEAST) / np.maximum(before, LEAST))
     found, once = now <= 1.0, before <= 1.0
     print(
-        f"{name:14} {len(now):4}  without {_told(before)}, {once.sum()} within 1 %; with {_told(now)}, {found.sum()};"
+        f"{name:18} {len(now):4}  without {_told(before)}, {once.sum()} within 1 %; with {_told(now)}, {found.sum()};"
         f" difference {_told(now - before)}, of logarithms {_told(logarithm)};"
         f" won {np.sum(found & ~once)}, lost {np.sum(once & ~found)}",
         flush=True,
