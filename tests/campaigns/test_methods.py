@@ -38,6 +38,18 @@ def test_every_method_asks_first_for_the_design_and_answers_with_a_good_point(na
         assert hill(answer) == pytest.approx(max(hill(u) for u in asked))
 
 
+@pytest.mark.parametrize(("function", "border"), [("nes-polynomial", "clip"), ("nes-gmm", "extend")])
+def test_robust_methods_are_told_where_the_problem_clips_its_inputs(function, border):
+    plan = Plan("p", "t", {"a": ProblemSetup(function, 9, 6, input_noise="own")}, {"m": MethodSetup("surehold", True)})
+    method = build_method(plan.cells()[0], 2, np.full((1, 2), 0.5), 0)
+    assert method._optimizer._ranking.accurate.border == border
+    told = {"border": "keep"}
+    plan = Plan(
+        "p", "t", {"a": ProblemSetup(function, 9, 6, input_noise="own")}, {"m": MethodSetup("surehold", True, told)}
+    )
+    assert build_method(plan.cells()[0], 2, np.full((1, 2), 0.5), 0)._optimizer._ranking.accurate.border == "keep"
+
+
 def test_a_trust_region_that_became_too_small_begins_anew():
     if "botorch-turbo" not in installed_peers():
         pytest.skip("botorch is not installed")

@@ -26,10 +26,13 @@ class BoTorch:
     """BoTorch: SingleTaskGP and LogExpectedImprovement; with the noise known, its input perturbation.
 
     With `perturbations` (s, d) of the unit cube the model averages over them, the criterion is the expected improvement
-    of that average, and the answer the observed input with the best one.
+    of that average, and the answer the observed input with the best one. `clips`: perturbed inputs are moved
+    back to the border of the cube.
     """
 
-    def __init__(self, dimension: int, initial: Array, seed: int, perturbations: Array | None = None):
+    def __init__(
+        self, dimension: int, initial: Array, seed: int, perturbations: Array | None = None, clips: bool = False
+    ):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # importing it warns
             import torch
@@ -41,6 +44,7 @@ class BoTorch:
         if perturbations is not None:
             self._shifts = torch.tensor(perturbations)
             self._average = ExpectationPosteriorTransform(n_w=len(perturbations))
+        self._clips = clips
         self._told = Told(initial)
         self._model: tuple[int, Any] | None = None
 
@@ -96,7 +100,8 @@ class BoTorch:
                 from botorch.models.transforms.input import InputPerturbation
                 from gpytorch.mlls import ExactMarginalLogLikelihood
 
-                transform = None if self._shifts is None else InputPerturbation(self._shifts)
+                cube = torch.tensor([[0.0], [1.0]]).expand(2, len(self._told.X[0])) if self._clips else None
+                transform = None if self._shifts is None else InputPerturbation(self._shifts, bounds=cube)
                 model = SingleTaskGP(torch.tensor(np.array(self._told.X)), y, input_transform=transform)
                 fit_gpytorch_mll(ExactMarginalLogLikelihood(model.likelihood, model))
                 model.eval()

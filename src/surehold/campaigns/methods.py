@@ -108,18 +108,19 @@ def build_method(cell: Cell, dimension: int, initial: NDArray[np.float64], seed:
     """
     told = cell.as_data()
     noise = unit_noise_of(cell.on) if cell.by.robust else None
+    asked = robust_problem_of(cell.on) if cell.by.robust else None
+    clips = asked is not None and getattr(asked.function, "clips", False)
     if cell.by.optimizer == "surehold":
-        asked = robust_problem_of(cell.on) if cell.by.robust else None
-        risk = (
-            {} if asked is None or asked.risk == "mean" else {n: getattr(asked, n) for n in ("risk", "alpha", "beta")}
-        )
-        return Surehold(dimension, initial, seed, noise, {**risk, **told["settings"]})
+        stated = {"border": "clip"} if clips else {}
+        if asked is not None and asked.risk != "mean":
+            stated |= {name: getattr(asked, name) for name in ("risk", "alpha", "beta")}
+        return Surehold(dimension, initial, seed, noise, {**stated, **told["settings"]})
     if cell.by.optimizer in EMBEDDED:
         return EMBEDDED[cell.by.optimizer](dimension, initial, seed)
     if cell.by.optimizer not in installed_peers():
         missing = ", ".join(REQUIRES[cell.by.optimizer])
         raise InputError(f"method '{cell.method}' needs {missing}; install them: pip install 'surehold[peers]'.")
-    extra = {} if noise is None else {"perturbations": _perturbations(noise, dimension, seed)}
+    extra = {} if noise is None else {"perturbations": _perturbations(noise, dimension, seed), "clips": clips}
     return PEERS[cell.by.optimizer](dimension, initial, seed, **extra)
 
 

@@ -55,7 +55,7 @@ class Formula:
         self.name: Final[str] = name
         self.box: Final[Box] = box
         self.border: Final = "extend"  # clipping is done by the function itself
-        self._clips = border == "clip"
+        self.clips: Final = border == "clip"
         self._f = f
         self._starts = np.reshape(np.asarray(starts, dtype=np.float64), (-1, box.dimension))
         self._optimum: Optimum | None = None
@@ -70,7 +70,7 @@ class Formula:
     def __call__(self, x: ArrayLike) -> float | NDArray[np.float64]:
         """Return the value at x (d,) as a float, or the values at x (n, d) as an array (n,)."""
         points, single = checked_points(x, self.box)
-        if self._clips:
+        if self.clips:
             points = np.clip(points, self.box.lower, self.box.upper)
         values = self._f(points)
         return float(values[0]) if single else values
@@ -87,7 +87,7 @@ class Formula:
         points, single = checked_points(x, self.box)
         found = np.empty((2, len(points)))
         for i, point in enumerate(points):
-            reached, weights = reached_inputs(point, self.box, noise, self._clips)
+            reached, weights = reached_inputs(point, self.box, noise, self.clips)
             values = self._f(reached)
             found[0, i] = weights @ values
             found[1, i] = np.sqrt(weights @ (values - found[0, i]) ** 2)

@@ -1,15 +1,19 @@
 """The promise against closed forms and draws on a fine grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
 
+import surehold as sh
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact, quasi_monte_carlo, sigma_points
 from surehold.optimization.strategy.promise import promise
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.problems.named import robust_problem
 
 GRID = np.linspace(0.0, 1.0, 1001)[:, None]
 NONE = np.empty((0, 1))
@@ -55,3 +59,24 @@ def test_of_a_risk_measure(finer, posterior):
     expected = measure.corrected(finer).over(TRIED)(GRID).max()
     found = promise(ranking, posterior, HISTORY, np.random.default_rng(0))
     assert 0.999 * expected <= found < 1.1 * expected, "between two points of the grid there is little more"
+
+
+def test_what_sigma_points_misjudge_is_found_by_more_points():
+    """A steep polynomial, tried as if candidates were screened by sigma points: what is left to gain is not found."""
+    problem = robust_problem("nes-polynomial")
+    f = problem.function
+    optimizer = sh.Optimizer(f.box, n_initial=5, seed=2, input_noise=problem.noise, border="clip")
+    seeing, covering = optimizer._ranking, optimizer._strategy
+    blind = replace(seeing, screening=None)
+    optimizer._strategy = replace(covering, strategy=replace(covering.strategy, ranking=blind))
+    for _ in range(50):
+        x = optimizer.ask()
+        optimizer.tell(x, float(f(x)))
+    posterior, history = optimizer.posterior, optimizer._history
+    side = np.linspace(0.0, 1.0, 61)
+    outcome = seeing.accurate.outcome(posterior, np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2))
+    best, _ = seeing.incumbent(posterior, history, "robust")
+    most = improvement(outcome.mean, np.sqrt(outcome.variance), best).max()
+    missed, found = (promise(ranking, posterior, history, np.random.default_rng(0)) for ranking in (blind, seeing))
+    assert 0.5 * most < found < 1.05 * most
+    assert missed < 0.1 * most

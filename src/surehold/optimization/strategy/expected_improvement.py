@@ -48,13 +48,13 @@ class ExpectedImprovement:
             regions = self.trust_region.within(regions, anchors[0], history.observed)
         d = anchors.shape[1]
         margin = self._margin(history)
-        accurate, coarse = (Perturbations(exact(d)),) * 2 if scale == "exact" else (ranking.accurate, ranking.coarse)
+        accurate, few = (Perturbations(exact(d)),) * 2 if scale == "exact" else (ranking.accurate, ranking.screen)
         found = multistart(
             Acquisition(posterior, self.criterion, accurate, best, margin=margin, kappa=self.kappa),
             Acquisition(
                 posterior.thinned(SCREENING_DIVISOR),
                 self.criterion,
-                coarse,
+                few,
                 float(np.mean(best)),
                 margin=margin,
                 kappa=self.kappa,
@@ -68,7 +68,7 @@ class ExpectedImprovement:
         if not len(found):
             return found
         if scale == "robust":
-            found = np.concatenate([where_to_look(posterior, found[0], accurate, coarse), found])
+            found = np.concatenate([where_to_look(posterior, found[0], accurate, ranking.coarse), found])
         return found
 
     def _margin(self, history: History) -> float:

@@ -9,6 +9,7 @@ from surehold.defaults import (
     OUTCOME_EXPONENT,
     QUASI_RANDOM_EXPONENT,
     QUASI_RANDOM_EXPONENT_OF_FEW,
+    SCREENING_EXPONENT,
 )
 from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
@@ -77,11 +78,13 @@ def strategy_named(
     accurate = Perturbations.of(input_noise, box, rule, border, k=k, exponent=exponent, allowed=allowed)
     risk.check_weights(accurate.quadrature.weights, rule)
     coarse = Perturbations.of(input_noise, box, "unscented", border, allowed=allowed)
-    finer = None
+    screening = finer = None
+    if rule == "quasi_monte_carlo" and shaken:
+        screening = Perturbations.of(input_noise, box, rule, border, exponent=SCREENING_EXPONENT, allowed=allowed)
     if quadrature is None and rule == "quasi_monte_carlo" and risk.name != "worst" and shaken:
         exponent = (CORRECTION_EXPONENT_OF_FEW if few else CORRECTION_EXPONENT) if averse else OUTCOME_EXPONENT
         finer = Perturbations.of(input_noise, box, rule, border, exponent=exponent, allowed=allowed)
-    ranking = Ranking(accurate, coarse, risk, noisy, thesis is None, finer)
+    ranking = Ranking(accurate, coarse, risk, noisy, thesis is None, finer, screening)
     if thesis is not None:
         for setting, given in (
             (f"risk='{risk.name}'", averse),

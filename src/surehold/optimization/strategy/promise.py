@@ -30,7 +30,7 @@ def promise(ranking: Ranking, posterior: Posterior, history: History, rng: np.ra
     best, anchors = replace(ranking, risk=Risk()).incumbent(posterior, history, scale)
     objective, screen = (
         Acquisition(posterior, CriterionName("ei", scale), perturbations, best)
-        for perturbations in (ranking.accurate, ranking.accurate if ranking.exact_inputs else ranking.coarse)
+        for perturbations in (ranking.accurate, ranking.accurate if ranking.exact_inputs else ranking.screen)
     )
     found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, history.admission)
     if history.admission is not None:

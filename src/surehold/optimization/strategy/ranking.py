@@ -3,7 +3,8 @@
 Legend
     U         points of the unit cube, (q, d)
     accurate  quadrature by which outcomes under the input noise are computed
-    coarse    sigma points: cheap, good enough to choose the inputs whose mean is computed again
+    coarse    sigma points
+    screening a few points of the accurate rule: cheap, good enough to choose the inputs whose mean is computed again
     finer     quadrature with more points than the accurate one: too dear for a search, not for its last step
     outcome   UO(x) = sum_i w_i mean_j mu_j(x + xi_i) over perturbations i and particles j     thesis (3.21)
 """
@@ -65,6 +66,8 @@ class Ranking:
     """whether fewer perturbations and a part of the particles choose which inputs are ranked accurately"""
     finer: Perturbations | None = None
     """what the best one anywhere climbs on by, and what corrects a risk measure; None: nothing"""
+    screening: Perturbations | None = None
+    """what candidates are screened by; None: the coarse ones"""
     _last: list[tuple[Posterior, NDArray[np.float64], NDArray[np.intp]]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
@@ -105,7 +108,7 @@ class Ranking:
         anchors = tried[self.order(posterior, tried)[:ANCHORS]]
         if self.risk.name == "mean":
             finer = self.accurate if self.finer is None else self.finer
-            objective, screen, last = (_mean_outcome(posterior, rule) for rule in (self.accurate, self.coarse, finer))
+            objective, screen, last = (_mean_outcome(posterior, rule) for rule in (self.accurate, self.screen, finer))
         else:
             some = posterior if self.risk.name == "worst" else posterior.thinned(SCREENING_DIVISOR)
             objective = screen = self._expected(some)
@@ -173,6 +176,11 @@ class Ranking:
         return self.finer if posterior.diagnostics.observations <= CONTENDERS else None
 
     @property
+    def screen(self) -> Perturbations:
+        """What candidates are screened by."""
+        return self.coarse if self.screening is None else self.screening
+
+    @property
     def exact_inputs(self) -> bool:
         """Whether inputs are reached exactly."""
         return len(self.accurate.quadrature.weights) == 1
@@ -185,7 +193,7 @@ class Ranking:
         """Return about what `measure` does: of what a part of the particles expects, by few perturbations."""
         few = posterior.thinned(SCREENING_DIVISOR)
         if self.risk.name == "mean":
-            return self.coarse.outcome(few, U).mean.mean(axis=0)
+            return self.screen.outcome(few, U).mean.mean(axis=0)
         perturbations = self.coarse if self.correction(posterior) is None else self.accurate
         around = perturbations.around(U)  # (q, s, d)
         mean = means(few, around.reshape(-1, U.shape[1])).mean(axis=0).reshape(around.shape[:2])
