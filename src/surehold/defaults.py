@@ -100,8 +100,8 @@ QUASI_RANDOM_EXPONENT: Final = 5
 QUASI_RANDOM_EXPONENT_OF_FEW: Final = 6
 FEW_VARIABLES: Final = 3
 #: The same by which candidates are screened, those that climb being chosen among them. By sigma points, which it was
-#: before, the place that was .7 better than all others on the polynomial of Bertsimas was 1,124th of 6,561, and never
-#: tried: docs/results/where-it-fails.md.
+#: before, places that the model held for better were never tried: docs/results/where-it-fails.md; surehold campaign run
+#: robust-published --only "NES polynomial,surehold robust". With 2**6 it ends no nearer there.
 SCREENING_EXPONENT: Final = 4
 #: Scramblings of which the points with the least discrepancy are taken. Never measured against other numbers; the rule
 #: as it comes out: python -m benchmarks.rule_regret.
