@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from surehold.cli import run
+from surehold.optimization import assembly
 from surehold.optimization.success import SUCCESS_SURROGATES
 from surehold.optimization.surrogates.named import SURROGATES
 from surehold.reports import files
@@ -198,6 +199,20 @@ def test_a_run_is_judged_by_the_risk_measure_it_was_asked_for(here, capsys):
     assert stored["risk"] == "mean of the worst 20 %"
     assert surehold("study recommend s") == 0
     assert f"mean of the worst 20 % {answer['predicted_worth']:.4g}" in capsys.readouterr().out
+
+
+def test_a_published_problem_that_clips_its_inputs_is_modelled_so(here, monkeypatch):
+    borders, built = [], assembly.strategy_named
+
+    def strategy_named(*arguments, **settings):
+        borders.append(settings["border"])
+        return built(*arguments, **settings)
+
+    monkeypatch.setattr(assembly, "strategy_named", strategy_named)
+    for words, border in (("nes-polynomial", "clip"), ("nes-polynomial --method bo", "extend"), ("nes-gmm", "extend")):
+        borders.clear()
+        assert surehold(f"maximize {words} --trials 6 --initial 5 --requeries 0") == 0
+        assert set(borders) == {border}
 
 
 def test_a_published_problem_is_run_under_its_own_risk_measure(here, capsys):

@@ -138,7 +138,8 @@ def maximize(
         tolerate_failures=tolerate_failures,
         kept=kept,
         required=limits_given(constraint, allowed, feasible, failures, safety, first)
-        | ({"surrogate": surrogate} if surrogate else {}),
+        | ({"surrogate": surrogate} if surrogate else {})
+        | ({"border": "clip"} if method == "ubo" and getattr(chosen, "clips", False) else {}),
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)
