@@ -87,7 +87,7 @@ def shape_size(kernel: int) -> int:
 def additive_share(kernel, scales):
     """Return the share (1 - w) / d of each process of one variable; 0 where the kernel has none."""
     if kernel == TWO_SCALES and scales[-2] > _ADDITIVE:
-        return (1.0 - scales[-1]) / (scales.size - 2)
+        return max(1.0 - scales[-1], _NOTHING) / (scales.size - 2)
     return 0.0
 
 
