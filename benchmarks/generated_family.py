@@ -25,8 +25,8 @@ from threadpoolctl import threadpool_limits
 
 import surehold as sh
 from benchmarks.generated_landscapes import BUDGETS, NOISES, SHAPES, TEST, TRAINING, landscape
+from surehold.campaigns.methods import perturbations_of
 from surehold.campaigns.peers import installed_peers
-from surehold.optimization.noise.kinds import root_of
 
 OURS = {
     "default": {},
@@ -75,7 +75,9 @@ def _answers(problem, method, initial, budget, seed):
         optimizer = sh.Optimizer(problem.box, n_initial=len(initial), seed=seed, **noise, **(settings or {}))
         answer = (lambda: X[int(np.argmax(y))]) if settings is None else (lambda: optimizer.recommend().x)
     else:
-        told = {"root": _root(problem), "bounded": problem.noise.bounded} if method in TOLD else {}
+        told = (
+            {"perturbations": perturbations_of(_everywhere(problem), problem.dimension, seed)} if method in TOLD else {}
+        )
         maker = installed_peers()[TOLD.get(method, method)]
         optimizer, waiting = maker(problem.dimension, initial, seed, **told), []
         answer = optimizer.answer
@@ -89,10 +91,11 @@ def _answers(problem, method, initial, budget, seed):
     return answers
 
 
-def _root(problem):
-    """Return the root (d, d) of the noise's covariance; where it varies, of that in the middle of the box."""
-    middle = np.full(problem.dimension, 0.5)
-    return root_of(problem.noise.unit_covariance(problem.box, middle if problem.noise.varies else None))
+def _everywhere(problem):
+    """Return the noise, and where it varies that in the middle of the box."""
+    if not problem.noise.varies:
+        return problem.noise
+    return sh.InputNoise(covariance=problem.noise.unit_covariance(problem.box, np.full(problem.dimension, 0.5)))
 
 
 def summary(rows, reference=None):

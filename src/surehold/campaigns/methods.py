@@ -24,7 +24,7 @@ from surehold.optimization.surrogates.gaussian_process.model import GaussianProc
 from surehold.optimization.surrogates.named import SURROGATES
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, least_leaf_width
 
-__all__ = ["METHODS", "Method", "build_method", "checked_method", "checked_settings"]
+__all__ = ["METHODS", "Method", "build_method", "checked_method", "checked_settings", "perturbations_of"]
 
 #: Optimizers that a plan may name.
 METHODS: Final = ("surehold", *EMBEDDED, *PEERS)
@@ -120,7 +120,7 @@ def build_method(cell: Cell, dimension: int, initial: NDArray[np.float64], seed:
     if cell.by.optimizer not in installed_peers():
         missing = ", ".join(REQUIRES[cell.by.optimizer])
         raise InputError(f"method '{cell.method}' needs {missing}; install them: pip install 'surehold[peers]'.")
-    extra = {} if noise is None else {"perturbations": _perturbations(noise, dimension, seed), "clips": clips}
+    extra = {} if noise is None else {"perturbations": perturbations_of(noise, dimension, seed), "clips": clips}
     return PEERS[cell.by.optimizer](dimension, initial, seed, **extra)
 
 
@@ -163,8 +163,14 @@ def checked_settings(where: str, optimizer: str, settings: Mapping[str, Any], ro
         raise InputError(f"{where}: '{optimizer}' cannot be told of input noise; leave `robust` out.")
 
 
-def _perturbations(noise: InputNoise, dimension: int, seed: int) -> NDArray[np.float64]:
-    """Return 16 quasi-random perturbations (s, d) of noise that is the same everywhere; where it is samples, these."""
+def perturbations_of(noise: InputNoise, dimension: int, seed: int) -> NDArray[np.float64]:
+    """Return 16 quasi-random perturbations (s, d) of noise of the unit cube; where it is samples, these.
+
+    Raises
+    ------
+    InputError
+        If the noise is not the same everywhere.
+    """
     if noise.varies:
         raise InputError(f"BoTorch is told of input noise that is the same everywhere, not {noise!r}.")
     if isinstance(noise.kind, Samples):

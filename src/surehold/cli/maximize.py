@@ -109,6 +109,7 @@ def maximize(
     from surehold.cli.session import NO_SUCCESS, Kept, folder_for, run_session
     from surehold.optimization.optimizer import Optimizer
 
+    border = {"border": "clip"} if method == "ubo" and getattr(chosen, "clips", False) else {}
     kept = Kept(study, storage, {"function": problem} if ":" in problem else {"synthetic": problem})
     budget = defaults.trials if trials is None else trials
     start = initial
@@ -131,6 +132,7 @@ def maximize(
             "bounds": bounds or None,
             "input noise": noise_text,
             "surrogate": surrogate or "default",
+            **border,
         },
         direction=direction,
         outcome=outcome,
@@ -139,7 +141,7 @@ def maximize(
         kept=kept,
         required=limits_given(constraint, allowed, feasible, failures, safety, first)
         | ({"surrogate": surrogate} if surrogate else {})
-        | ({"border": "clip"} if method == "ubo" and getattr(chosen, "clips", False) else {}),
+        | border,
     )
     if not report.succeeded:
         raise typer.Exit(NO_SUCCESS)
