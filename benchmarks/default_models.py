@@ -4,7 +4,8 @@
                 regret [%] of all, by number of variables and by shape. `--rows FILE` keeps the runs, and those that it
                 holds are not made again; with `--count 0` all of them are printed
     separable   seeds of `benchmarks.separable_functions`, four to eight variables, with noise or none; regret [%] at
-                half and full budget, `--rows` likewise
+                half and full budget, `--rows` likewise. `--variables 2 3` draws functions of as many, and leaves out
+                landscapes of more or fewer
     robust      functions of `benchmarks.robust_regret` (`--names`), seeds 200 to 229; final regret [%]
     smooth      functions of `benchmarks.smooth_regret` (`--names`) without noise, seeds 10 to 29; logarithms of the
                 regret at half and full budget
@@ -12,16 +13,17 @@
                 150 in seven, with input noise and without; medians of 9, the two in turns
 
 Of each problem a run of the default, and one whose model has no particles of the model that is named: `smooth`, the
-squared-exponential process, or `sums` of processes of one variable, from four variables on; with the same initial
-design. Printed are means with standard errors, the paired difference and, of regrets in per cent, runs within 1 %, the
-difference of the logarithm (base 10; regrets below 0.01 % count as that), and how many runs come within 1 % with the
-model that do not without it, and the other way round.
+squared-exponential process, or `sums` of processes of one variable; with the same initial design. Printed are means
+with standard errors, the paired difference and, of regrets in per cent, runs within 1 %, the difference of the
+logarithm (base 10; regrets below 0.01 % count as that), and how many runs come within 1 % with the model that do not
+without it, and the other way round.
 """
 
 import argparse
 import json
 import time
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 from unittest import mock
 
@@ -69,7 +71,7 @@ def searching(variant, model):
 
     changed = {
         "smooth": {"mode": mode, "log_evidence_and_root": log_evidence_and_root},
-        "sums": {"ADDITIVE_FROM": np.inf},
+        "sums": {"ADDITIVE_UP_TO": 0},
     }
     with mock.patch.multiple(hyperparameters, **changed[model]) if variant == "without" else nullcontext():
         yield
@@ -84,9 +86,9 @@ def on_landscape(seed):
     return regret(problem, optimizer.recommend().x)
 
 
-def on_separable(seed):
-    """Return the regrets [%] at half and full budget on the function of a seed."""
-    problem = separable(seed)
+def on_separable(seed, variables):
+    """Return the regrets [%] at half and full budget on the function of a seed, of that many variables."""
+    problem = separable(seed, *variables)
     n_initial = sh.Optimizer.default_n_initial(problem.box)
     design = qmc.LatinHypercube(problem.dimension, rng=np.random.default_rng([seed, 0, 98])).random(n_initial)
     optimizer = sh.Optimizer(problem.box, n_initial=n_initial, seed=0, input_noise=problem.noise)
@@ -125,6 +127,9 @@ def main():
     parser.add_argument("--without", choices=("smooth", "sums"), default="sums", help="model that the one run lacks")
     parser.add_argument("--first", type=int, help="first seed, or its number in the set")
     parser.add_argument("--count", type=int, help="seeds")
+    parser.add_argument(
+        "--variables", type=int, nargs=2, metavar=("FEWEST", "MOST"), help="of landscapes or separable functions"
+    )
     parser.add_argument("--names", nargs="+", help="functions, of robust and smooth")
     parser.add_argument("--rows", type=Path, help="file of the runs on landscapes or separable functions, a line each")
     arguments = parser.parse_args()
@@ -138,15 +143,19 @@ def main():
         if subject == "time":
             _print_times(model, seeds)
         elif subject == "landscapes":
-            found = _kept(on_landscape, model, seeds, arguments.rows)
+            low, high = arguments.variables or GROUPS["all"]
+            drawn = [seed for seed in seeds if low <= landscape(seed).dimension <= high]
+            found = _kept(on_landscape, model, drawn, arguments.rows)
             for name, members in _groups(sorted(found)).items():
                 if len(members) > 1:
                     _print_regrets(name, *np.array([found[seed] for seed in members]).T)
         elif subject == "separable":
-            found = _kept(on_separable, model, seeds, arguments.rows)
+            variables = arguments.variables or (4, 8)
+            found = _kept(partial(on_separable, variables=variables), model, seeds, arguments.rows)
             for name, chosen in SEPARABLE.items():
-                pairs = np.array([found[seed] for seed in sorted(found) if chosen(separable(seed))])  # (n, 2, 2)
-                if len(pairs) > 1:
+                members = [seed for seed in sorted(found) if chosen(separable(seed, *variables))]
+                pairs = np.array([found[seed] for seed in members])  # (n, 2, 2)
+                if len(members) > 1:
                     _print_regrets(f"{name}, half", *pairs[:, :, 0].T)
                     _print_regrets(f"{name}, full", *pairs[:, :, 1].T)
         else:

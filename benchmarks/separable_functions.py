@@ -1,7 +1,7 @@
 """Sums and products of functions of one variable each, drawn by seed, for `benchmarks.default_models`.
 
 Legend
-    x    points of the unit cube (n, d), d from 4 to 8; the function goes on beyond it
+    x    points of the unit cube (n, d), d from 4 to 8 or as asked for; the function goes on beyond it
     p_k  part of variable k: sum_i h_i exp(-(x_k - c_i)^2 / (2 w_i^2)), two to four bumps
     f    a sum, sum_k a_k p_k, or a product, prod_k (1 + a_k p_k); a_k says how much variable k matters
     g    E f(x + noise), noise of the same deviation along every variable or none: closed form, part by part
@@ -57,10 +57,10 @@ class Separable:
         return value, value - float(self.expectation(qmc.Sobol(self.dimension, scramble=False).random_base2(13)).mean())
 
 
-def separable(seed):
-    """Return the function of a seed."""
+def separable(seed, fewest=4, most=8):
+    """Return the function of a seed, of that many variables."""
     rng = np.random.default_rng([seed, 62])
-    d = int(rng.integers(4, 9))
+    d = int(rng.integers(fewest, most + 1))
     form = FORMS[rng.integers(len(FORMS))]
     deviation = float(rng.choice([0.0, 1.0])) * rng.uniform(0.02, 0.06)
     parts = []

@@ -177,12 +177,10 @@ NOISE_VARIANCE_PRIOR: Final = (log(1e-2), 3.0)
 #: python -m benchmarks.smooth_regret --methods default gp.
 PROPORTION_PRIOR: Final = (log(8.0), 0.7)
 SHARE_PRIOR: Final = (log(0.1), 1.5)
-#: Variables from which on, and up to which, a sum of processes of one variable each is one of the models. In two and
-#: three it solves the polynomial of Bertsimas, and is to be judged (docs/results/where-it-fails.md). Of many, a hundred
-#: trials do not tell one-dimensional functions: on Styblinski-Tang in 50 one run came to 1,176, those of the process of
-#: one scale to 1,171 (28) (surehold campaign run high-dimension), and in 100 outcomes under noise take three times as
-#: long. python -m benchmarks.default_models separable, and landscapes.
-ADDITIVE_FROM: Final = 4
+#: Variables up to which a sum of processes of one variable each is one of the models. Of many, a hundred trials do not
+#: tell one-dimensional functions: on Styblinski-Tang in 50 one run came to 1,176, those of the process of one scale to
+#: 1,171 (28) (surehold campaign run high-dimension), and in 100 outcomes under noise take three times as long.
+#: python -m benchmarks.default_models separable, and landscapes.
 ADDITIVE_UP_TO: Final = 30
 #: The same as SHARE_PRIOR, of the process of all variables beside that sum: it may be next to nothing. Of 30 sums and
 #: products, which chose it, the regret with SHARE_PRIOR in its place was 2.2 % in place of 1.0 %:

@@ -60,7 +60,7 @@ class Optimizer(Record):
         How far the reached input strays from the commanded one; None for inputs that are reached exactly.
     surrogate
         "two_scales" (default without a preset: a Gaussian process of one rough scale, of one smooth scale, the sum of
-        a long and a short one, or, in 4 to 30 variables, a sum of processes of one variable each, whichever the trials
+        a long and a short one, or, in 2 to 30 variables, a sum of processes of one variable each, whichever the trials
         speak for), "gp" (one rough scale; default of the presets),
         "tgp" (a treed Gaussian process, for functions that are smooth here and rough there), "local_global" (rough
         around a center that is learnt, smooth elsewhere; the fewest trials where little of the box matters, at three

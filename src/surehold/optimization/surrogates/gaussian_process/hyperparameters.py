@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.defaults import (
-    ADDITIVE_FROM,
     ADDITIVE_UP_TO,
     BURN_IN,
     INTERACTION_PRIOR,
@@ -144,7 +143,7 @@ def learn(
 def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Generator) -> Learnt:
     """Draw particles of several models, equally likely beforehand.
 
-    They are one rough scale, one smooth scale, two scales, and, where variables are neither few nor many, a sum of
+    They are one rough scale, one smooth scale, two scales, and, where variables are several and not too many, a sum of
     processes of one variable each with a share of one of all of them. Each has as many particles as its evidence
     p(y | model) says (Laplace's method, MacKay 2003, section 27), so that a function of one scale is modelled as if
     there were no second one, one that all derivatives exist of (squared exponential) as such, and one whose variables
@@ -160,7 +159,7 @@ def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Ge
         "squared_exponential": _ABSENT,
     }
     models = [*(alone._replace(kernel=kernel_number(name)) for name in one_scale), evidence]
-    if ADDITIVE_FROM <= d <= ADDITIVE_UP_TO:
+    if 1 < d <= ADDITIVE_UP_TO:
         mean, deviation = evidence.prior_mean.copy(), evidence.prior_deviation.copy()
         mean[d] = LOG_ADDITIVE  # in the median the short part is as long as the others
         mean[d + 1], deviation[d + 1] = INTERACTION_PRIOR

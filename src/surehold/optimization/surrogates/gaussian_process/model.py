@@ -57,7 +57,7 @@ class GaussianProcess:
         "matern52" (default), "matern32", "squared_exponential", or "matern52_product", the product of Matern-5/2
         correlations of single variables; one length-scale a dimension. "matern52_two_scales" is the sum of a long and
         a short process: how much of the variance is the short one's, and whether there is one at all, is learnt; and
-        where there is none, whether the long one is "matern52" or "squared_exponential". In 4 to 30 variables the long
+        where there is none, whether the long one is "matern52" or "squared_exponential". In 2 to 30 variables the long
         one may also be a sum of processes of one variable each.
     signal_variance
         Fixed signal variance; None (default) learns it. In squared standard deviations of the outputs, or in squared
