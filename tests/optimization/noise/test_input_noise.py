@@ -47,6 +47,7 @@ def test_a_variable_may_be_exact():
         (lambda: InputNoise.unit(0.0), "no noise"),
         (lambda: InputNoise.unit(-0.1), "0 or more"),
         (lambda: InputNoise.unit(np.inf), "finite"),
+        (lambda: InputNoise.unit([0.0, 0.05]), r"one share .* not \[0.0, 0.05\]; for one "),
         (lambda: InputNoise(covariance=[[1.0, 2.0], [2.0, 1.0]]), "positive definite"),
         (lambda: InputNoise(covariance=[[1.0, 0.0], [0.5, 1.0]]), "symmetric"),
         (lambda: InputNoise(covariance=[[1.0, np.nan], [np.nan, 1.0]]), "finite"),

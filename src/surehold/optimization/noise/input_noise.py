@@ -127,6 +127,11 @@ class InputNoise:
     @classmethod
     def unit(cls, standard_deviation: float) -> "InputNoise":
         """Return noise of the same `standard_deviation` in every variable, as a fraction of the box (0.03 = 3 %)."""
+        if np.ndim(standard_deviation) > 0:
+            raise InputError(
+                f"InputNoise.unit takes one share of the box for every variable, not {standard_deviation!r}; for one "
+                "each, in the box's units: InputNoise({name: standard deviation})."
+            )
         value = checked_deviation("every variable", standard_deviation)
         if value == 0.0:
             raise InputError(_NO_NOISE)
