@@ -8,7 +8,7 @@ its standard error over runs, the largest miss, and the mean of the best respons
 1 - safety.
 
     default       as it is
-    rough models  without particles of the squared-exponential process (`benchmarks.default_models`)
+    rough models  without particles of the squared-exponential process (`benchmarks.default_parts`)
 """
 
 import argparse
@@ -18,7 +18,7 @@ from scipy.stats import qmc
 
 import surehold as sh
 from benchmarks.calibration import random_function
-from benchmarks.default_models import searching
+from benchmarks.default_parts import searching
 
 TRIALS = {"straight": 9, "one variable": 12, "two variables": 12}
 

@@ -1,4 +1,4 @@
-"""Sums and products of functions of one variable each, drawn by seed, for `benchmarks.default_models`.
+"""Sums and products of functions of one variable each, drawn by seed, for `benchmarks.default_parts`.
 
 Legend
     x    points of the unit cube (n, d), d from 4 to 8 or as asked for; the function goes on beyond it

@@ -137,6 +137,12 @@ START_DISTANCE: Final = 0.02
 #: besides the best ones wherever they are. Never measured on their own.
 CANDIDATES_IN_REGIONS: Final = 512
 STARTS_IN_REGIONS: Final = 6
+#: Coordinate exchange in more than FEW_VARIABLES variables: places along each variable, rounds, and points of a round
+#: at most, which leaves variables out where they are many. Never measured on their own; what the exchange gains:
+#: python -m benchmarks.default_parts separable --without exchange.
+EXCHANGE_PLACES: Final = 32
+EXCHANGE_ROUNDS: Final = 4
+EXCHANGE_POINTS: Final = 512
 #: Evaluations, with gradient, of one ascent. Never measured on its own.
 ASCENT_EVALUATIONS: Final = 40
 #: Evaluations of the ascent by a corrected risk measure, which begins at the best trial by it. Never measured.
@@ -180,11 +186,11 @@ SHARE_PRIOR: Final = (log(0.1), 1.5)
 #: Variables up to which a sum of processes of one variable each is one of the models. Of many, a hundred trials do not
 #: tell one-dimensional functions: on Styblinski-Tang in 50 one run came to 1,176, those of the process of one scale to
 #: 1,171 (28) (surehold campaign run high-dimension), and in 100 outcomes under noise take three times as long.
-#: python -m benchmarks.default_models separable, and landscapes.
+#: python -m benchmarks.default_parts separable, and landscapes.
 ADDITIVE_UP_TO: Final = 30
 #: The same as SHARE_PRIOR, of the process of all variables beside that sum: it may be next to nothing. Of 30 sums and
 #: products, which chose it, the regret with SHARE_PRIOR in its place was 2.2 % in place of 1.0 %:
-#: python -m benchmarks.default_models separable --first 0 --count 30
+#: python -m benchmarks.default_parts separable --first 0 --count 30
 INTERACTION_PRIOR: Final = (log(0.1), 3.0)
 #: Prior variance of the constant mean of two scales, in squared standard deviations of the outputs: trials crowd where
 #: the response is good, so that their mean is far from that of the box. With 1 in place of 0 the median error on twelve

@@ -1,4 +1,7 @@
-"""The highest point of an acquisition function over the unit cube, by gradient ascents from many candidates."""
+"""The highest point of an acquisition function over the unit cube, by gradient ascents from many candidates.
+
+In more than three variables the highest of these tops is looked at once more, variable by variable.
+"""
 
 from typing import Protocol
 
@@ -10,6 +13,7 @@ from surehold.defaults import (
     CANDIDATES_IN_REGIONS,
     COPIES,
     COPY_SCALES,
+    FEW_VARIABLES,
     SETTLING_COPIES,
     SETTLING_FIRST,
     SETTLING_ROUNDS,
@@ -19,6 +23,7 @@ from surehold.defaults import (
     STARTS_IN_REGIONS,
 )
 from surehold.optimization.maximizer.ascent import Objective, climb
+from surehold.optimization.maximizer.coordinate_exchange import exchanged
 from surehold.optimization.surrogates.protocol import Regions
 
 __all__ = ["Admits", "multistart", "promising"]
@@ -72,6 +77,12 @@ def multistart(
         leaders = np.sort(np.unique(home, return_index=True)[1])[:STARTS_IN_REGIONS]
         starts = sorted({*leaders.tolist(), *starts})
     tops, values = climb(objective, points[starts], regions.lower[home[starts]], regions.upper[home[starts]])
+    if dimension > FEW_VARIABLES:
+        better = exchanged(screen, tops[np.argmax(values)], regions.lower.min(axis=0), regions.upper.max(axis=0), rng)
+        if better is not None:
+            i = _regions_of(better[None, :], regions)
+            top, value = climb(objective, better[None, :], regions.lower[i], regions.upper[i])
+            tops, values = np.concatenate([tops, top]), np.concatenate([values, value])
     order = np.argsort(-values, kind="stable")
     if admission is not None:  # ascents stop at a border which is no box's; the best one goes along it
         tops = np.concatenate([_settled(objective, tops[order[0]], float(values[order[0]]), rng)[None, :], tops[order]])

@@ -1,4 +1,4 @@
-"""What one of the default's models gains: `python -m benchmarks.default_models landscapes --without sums`.
+"""What one of the default's parts gains: `python -m benchmarks.default_parts landscapes --without sums`.
 
     landscapes  training seeds of `benchmarks.generated_landscapes`, one to eight variables, all kinds of noise; final
                 regret [%] of all, by number of variables and by shape. `--rows FILE` keeps the runs, and those that it
@@ -12,11 +12,11 @@
     time        no search: CPU milliseconds of an ask with its learning, after 50 and 140 trials in two variables and
                 150 in seven, with input noise and without; medians of 9, the two in turns
 
-Of each problem a run of the default, and one whose model has no particles of the model that is named: `smooth`, the
-squared-exponential process, or `sums` of processes of one variable; with the same initial design. Printed are means
-with standard errors, the paired difference and, of regrets in per cent, runs within 1 %, the difference of the
-logarithm (base 10; regrets below 0.01 % count as that), and how many runs come within 1 % with the model that do not
-without it, and the other way round.
+Of each problem a run of the default, and one without the part that is named: the model `smooth`, a squared-exponential
+process, or `sums` of processes of one variable, whose particles it then lacks, or in the search the `exchange` of
+single variables; with the same initial design. Printed are means with standard errors, the paired difference and, of
+regrets in per cent, runs within 1 %, the difference of the logarithm (base 10; regrets below 0.01 % count as that),
+and how many runs come within 1 % with the part that do not without it, and the other way round.
 """
 
 import argparse
@@ -36,6 +36,7 @@ from benchmarks import robust_regret, smooth_regret
 from benchmarks.generated_landscapes import BUDGETS, SHAPES, landscape
 from benchmarks.search_variants import begun, regret
 from benchmarks.separable_functions import separable
+from surehold.optimization.maximizer import multistart
 from surehold.optimization.surrogates.gaussian_process import hyperparameters
 from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
 
@@ -59,8 +60,8 @@ SEPARABLE = {
 
 
 @contextmanager
-def searching(variant, model):
-    """Run the body with the default as it is or, for "without", without learning a model, smooth or sums, at all."""
+def searching(variant, part):
+    """Run the body with the default as it is or, for "without", without the part that is named."""
     learns, weighs = hyperparameters.mode, hyperparameters.log_evidence_and_root
 
     def mode(evidence):
@@ -69,11 +70,12 @@ def searching(variant, model):
     def log_evidence_and_root(evidence, center):
         return (np.nan, np.eye(center.size)) if evidence.kernel == SMOOTH else weighs(evidence, center)
 
-    changed = {
-        "smooth": {"mode": mode, "log_evidence_and_root": log_evidence_and_root},
-        "sums": {"ADDITIVE_UP_TO": 0},
+    absent = {
+        "smooth": mock.patch.multiple(hyperparameters, mode=mode, log_evidence_and_root=log_evidence_and_root),
+        "sums": mock.patch.object(hyperparameters, "ADDITIVE_UP_TO", 0),
+        "exchange": mock.patch.object(multistart, "FEW_VARIABLES", np.inf),
     }
-    with mock.patch.multiple(hyperparameters, **changed[model]) if variant == "without" else nullcontext():
+    with absent[part] if variant == "without" else nullcontext():
         yield
 
 
@@ -124,7 +126,9 @@ def ask_seconds(n, d, noise, seed):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("subject", choices=list(SEEDS))
-    parser.add_argument("--without", choices=("smooth", "sums"), default="sums", help="model that the one run lacks")
+    parser.add_argument(
+        "--without", choices=("smooth", "sums", "exchange"), default="sums", help="what the one run lacks"
+    )
     parser.add_argument("--first", type=int, help="first seed, or its number in the set")
     parser.add_argument("--count", type=int, help="seeds")
     parser.add_argument(
@@ -133,7 +137,7 @@ def main():
     parser.add_argument("--names", nargs="+", help="functions, of robust and smooth")
     parser.add_argument("--rows", type=Path, help="file of the runs on landscapes or separable functions, a line each")
     arguments = parser.parse_args()
-    subject, model = arguments.subject, arguments.without
+    subject, part = arguments.subject, arguments.without
     first, count = (
         usual if given is None else given
         for usual, given in zip(SEEDS[subject], (arguments.first, arguments.count), strict=True)
@@ -141,17 +145,17 @@ def main():
     seeds = range(first, first + count)
     with threadpool_limits(1):
         if subject == "time":
-            _print_times(model, seeds)
+            _print_times(part, seeds)
         elif subject == "landscapes":
             low, high = arguments.variables or GROUPS["all"]
             drawn = [seed for seed in seeds if low <= landscape(seed).dimension <= high]
-            found = _kept(on_landscape, model, drawn, arguments.rows)
+            found = _kept(on_landscape, part, drawn, arguments.rows)
             for name, members in _groups(sorted(found)).items():
                 if len(members) > 1:
                     _print_regrets(name, *np.array([found[seed] for seed in members]).T)
         elif subject == "separable":
             variables = arguments.variables or (4, 8)
-            found = _kept(partial(on_separable, variables=variables), model, seeds, arguments.rows)
+            found = _kept(partial(on_separable, variables=variables), part, seeds, arguments.rows)
             for name, chosen in SEPARABLE.items():
                 members = [seed for seed in sorted(found) if chosen(separable(seed, *variables))]
                 pairs = np.array([found[seed] for seed in members])  # (n, 2, 2)
@@ -160,22 +164,22 @@ def main():
                     _print_regrets(f"{name}, full", *pairs[:, :, 1].T)
         else:
             for name in arguments.names or NAMES[subject]:
-                _print_function(subject, model, name, seeds)
+                _print_function(subject, part, name, seeds)
 
 
-def _print_times(model, seeds):
+def _print_times(part, seeds):
     for n, d in ((50, 2), (140, 2), (150, 7)):
         for noise, title in ((None, "without noise"), (sh.InputNoise.unit(0.03), "under noise")):
             taken = {variant: [] for variant in VARIANTS}
             for seed in (0, *seeds):  # the first one compiles
                 for variant in VARIANTS:
-                    with searching(variant, model):
+                    with searching(variant, part):
                         taken[variant].append(ask_seconds(n, d, noise, seed))
             before, now = (1000.0 * np.median(taken[variant][1:]) for variant in VARIANTS)
             print(f"({n}, {d}) {title:13}  without {before:.1f} ms, with {now:.1f} ms, {now / before:.2f} times")
 
 
-def _kept(run, model, seeds, file):
+def _kept(run, part, seeds, file):
     """Return {seed: what the run of each variant found}, those of a file included."""
     known = {}
     if file is not None and file.exists():
@@ -183,7 +187,7 @@ def _kept(run, model, seeds, file):
     for seed in seeds:
         for variant in VARIANTS:
             if (seed, variant) not in known:
-                with searching(variant, model):
+                with searching(variant, part):
                     known[seed, variant] = run(seed)
                 if file is not None:
                     with file.open("a") as kept:
@@ -192,10 +196,10 @@ def _kept(run, model, seeds, file):
     return {seed: [known[seed, variant] for variant in VARIANTS] for seed in wanted}
 
 
-def _print_function(subject, model, name, seeds):
+def _print_function(subject, part, name, seeds):
     found = []
     for variant in VARIANTS:
-        with searching(variant, model):
+        with searching(variant, part):
             if subject == "robust":
                 found.append(np.array([on_robust(name, seed) for seed in seeds]))
             else:
