@@ -192,7 +192,7 @@ def _kept(run, part, seeds, file):
                 if file is not None:
                     with file.open("a") as kept:
                         print(json.dumps([seed, variant, known[seed, variant]]), file=kept)
-    wanted = seeds or {seed for seed, _ in known}
+    wanted = seeds or {seed for seed, _ in known if all((seed, variant) in known for variant in VARIANTS)}
     return {seed: [known[seed, variant] for variant in VARIANTS] for seed in wanted}
 
 
