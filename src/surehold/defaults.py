@@ -137,9 +137,9 @@ START_DISTANCE: Final = 0.02
 #: besides the best ones wherever they are. Never measured on their own.
 CANDIDATES_IN_REGIONS: Final = 512
 STARTS_IN_REGIONS: Final = 6
-#: Coordinate exchange in more than FEW_VARIABLES variables: places along each variable, rounds, and points of a round
-#: at most, which leaves variables out where they are many. Never measured on their own; what the exchange gains:
-#: python -m benchmarks.default_parts separable --without exchange.
+#: Coordinate exchange, where a sum of more than FEW_VARIABLES variables is learnt: places along each, rounds, and
+#: points of a round at most, which leaves variables out where they are many. Never measured on their own; what the
+#: exchange gains: python -m benchmarks.default_parts separable --without exchange.
 EXCHANGE_PLACES: Final = 32
 EXCHANGE_ROUNDS: Final = 4
 EXCHANGE_POINTS: Final = 512

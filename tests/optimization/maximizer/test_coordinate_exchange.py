@@ -5,6 +5,7 @@ import pytest
 
 from surehold.optimization.maximizer.coordinate_exchange import exchanged
 from surehold.optimization.maximizer.multistart import multistart
+from surehold.optimization.surrogates.protocol import Regions
 
 D = 6
 SPEEDS, PHASES = np.linspace(14.0, 20.0, D), np.linspace(0.0, 5.0, D)
@@ -29,8 +30,11 @@ def best():
 @pytest.mark.parametrize("seed", range(3))
 def test_the_highest_of_many_hills_is_found(seed):
     f = Sum()
-    found = multistart(f, f, D, np.full((1, D), 0.5), np.random.default_rng(seed))
+    anchors, whole = np.full((1, D), 0.5), Regions.whole(D, separable=True)
+    found = multistart(f, f, D, anchors, np.random.default_rng(seed), whole)
     assert f(found[:1])[0] == pytest.approx(best(), abs=1e-6)
+    without = multistart(f, f, D, anchors, np.random.default_rng(seed))
+    assert f(without[:1])[0] < best() - 0.1
 
 
 def test_a_sum_takes_one_round_of_all_variables_together():

@@ -189,7 +189,7 @@ def divide_and_climb(
     DIRECT with 500 d evaluations in each of the regions (None: in the cube), a tenth of them for a local polish, then
     local searches from five points around the incumbent (d,) over the whole cube. The local search climbs the gradient.
     """
-    lower, upper = regions or Regions.whole(dimension)
+    lower, upper, _ = regions or Regions.whole(dimension)
     budget = THESIS_EVALUATIONS * dimension
     polish = budget // THESIS_POLISH_DIVISOR
     found = divide_rectangles(objective, lower, upper, budget - polish)

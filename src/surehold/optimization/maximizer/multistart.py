@@ -1,6 +1,7 @@
 """The highest point of an acquisition function over the unit cube, by gradient ascents from many candidates.
 
-In more than three variables the highest of these tops is looked at once more, variable by variable.
+Where variables act each on its own, and are more than three, the highest of these tops is looked at once more, variable
+by variable.
 """
 
 from typing import Protocol
@@ -77,7 +78,7 @@ def multistart(
         leaders = np.sort(np.unique(home, return_index=True)[1])[:STARTS_IN_REGIONS]
         starts = sorted({*leaders.tolist(), *starts})
     tops, values = climb(objective, points[starts], regions.lower[home[starts]], regions.upper[home[starts]])
-    if dimension > FEW_VARIABLES:
+    if regions.separable and dimension > FEW_VARIABLES:
         better = exchanged(screen, tops[np.argmax(values)], regions.lower.min(axis=0), regions.upper.max(axis=0), rng)
         if better is not None:
             i = _regions_of(better[None, :], regions)

@@ -48,17 +48,19 @@ class Regions(NamedTuple):
     """(r, d)"""
     upper: NDArray[np.float64]
     """(r, d)"""
+    separable: bool = False
+    """whether variables act each on its own there, so that hills are as many as the product of those along each"""
 
     @classmethod
-    def whole(cls, d: int) -> "Regions":
+    def whole(cls, d: int, separable: bool = False) -> "Regions":
         """Return the unit cube as one region."""
-        return cls(np.zeros((1, d)), np.ones((1, d)))
+        return cls(np.zeros((1, d)), np.ones((1, d)), separable)
 
     def within(self, box: "Regions") -> "Regions":
         """Return the parts of these regions that lie in a box, given as a single region."""
         lower, upper = np.maximum(self.lower, box.lower), np.minimum(self.upper, box.upper)
         inside = (lower < upper).all(axis=1)
-        return Regions(lower[inside], upper[inside])
+        return Regions(lower[inside], upper[inside], self.separable)
 
 
 class PartitionSummary(NamedTuple):

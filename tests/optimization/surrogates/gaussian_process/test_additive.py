@@ -34,6 +34,7 @@ def additive_particles(posterior):
 def test_a_sum_is_modelled_as_one_and_known_where_no_trial_has_been():
     learnt = process(additive)
     assert additive_particles(learnt.posterior).all()
+    assert learnt.posterior.regions.separable
     X, Q = np.random.default_rng(0).random((60, D)), np.random.default_rng(1).random((500, D))
     mean, std = learnt.predict(Q, return_std=True)
     plain = GaussianProcess(mean_variance=1.0).fit(X, additive(X)).predict(Q)
@@ -47,6 +48,7 @@ def test_what_interacts_is_no_sum():
     posterior = process(interacting, n=100).posterior
     shares = posterior.hyperparameters.inverse_l[:, -1]
     assert not np.any(additive_particles(posterior) & (shares < 0.2))
+    assert not posterior.regions.separable
 
 
 @pytest.mark.parametrize("d", [1, ADDITIVE_UP_TO + 1])

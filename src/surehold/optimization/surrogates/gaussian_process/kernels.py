@@ -47,6 +47,7 @@ __all__ = [
     "TWO_SCALES",
     "additive_share",
     "along",
+    "are_sums",
     "correlation_and_factor",
     "correlations",
     "correlations_and_factors",
@@ -89,6 +90,11 @@ def additive_share(kernel, scales):
     if kernel == TWO_SCALES and scales[-2] > _ADDITIVE:
         return max(1.0 - scales[-1], _NOTHING) / (scales.size - 2)
     return 0.0
+
+
+def are_sums(kernel: int, scales: np.ndarray) -> np.ndarray:
+    """Return which of the scales (m, d + 2) of particles are those of sums of processes of one variable, (m,)."""
+    return scales[:, -2] > _ADDITIVE if kernel == TWO_SCALES else np.zeros(len(scales), dtype=bool)
 
 
 @njit(cache=True, fastmath={"contract"})

@@ -56,7 +56,7 @@ class NeighborPosterior:
         parts = [np.arange(n)[:: _COARSER**level] for level in range(3)]
         self._trees: Final = [(part, KDTree(evidence.X[part] * self._scale)) for part in parts]
         self.diagnostics: Final = FitDiagnostics(n, cost, 0, outputs.flat)
-        self.regions: Final = Regions.whole(d)
+        self.regions: Final = Regions.whole(d, self.hyperparameters.separable)
 
     def nearest(self, queries: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the trials (q, k) that queries (q, d) are answered from, in rising order, and how many each has (q,).

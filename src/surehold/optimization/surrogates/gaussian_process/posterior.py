@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, ndtri
 
 from surehold.errors import SureholdError
-from surehold.optimization.surrogates.gaussian_process.kernels import shape_size
+from surehold.optimization.surrogates.gaussian_process.kernels import are_sums, shape_size
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.prediction import (
@@ -38,6 +38,8 @@ class Hyperparameters(NamedTuple):
     """signal variances in standardized units, (m,)"""
     v: NDArray[np.float64]
     """learnt noise variances in standardized units, (m,)"""
+    separable: bool
+    """whether half of the particles or more are sums of processes of one variable each"""
 
     @classmethod
     def of(cls, theta: NDArray[np.float64], evidence: Evidence) -> "Hyperparameters":
@@ -51,6 +53,7 @@ class Hyperparameters(NamedTuple):
             inverse_l,
             np.exp(theta[:, position]) if evidence.learn_signal else np.full(m, evidence.signal_variance),
             np.exp(theta[:, -1]) if evidence.learn_noise else np.zeros(m),
+            bool(are_sums(evidence.kernel, inverse_l).mean() >= 0.5),
         )
 
 
@@ -91,7 +94,7 @@ class GaussianProcessPosterior:
         self._Y: Final = np.ascontiguousarray(np.broadcast_to(evidence.y, (m, n)) if Y is None else Y)
         self.factors: Final = factors or self._factorized()
         self.diagnostics: Final = FitDiagnostics(n, cost, self.factors.repaired, outputs.flat)
-        self.regions: Final = Regions.whole(d)
+        self.regions: Final = Regions.whole(d, self.hyperparameters.separable)
         self._priors: Final = Remembered[tuple[NDArray[np.float64], NDArray[np.float64]]]()
 
     def _factorized(self) -> Factors:
