@@ -9,8 +9,9 @@
     robust      functions of `benchmarks.robust_regret` (`--names`), seeds 200 to 229; final regret [%]
     smooth      functions of `benchmarks.smooth_regret` (`--names`) without noise, seeds 10 to 29; logarithms of the
                 regret at half and full budget
-    time        no search: CPU milliseconds of an ask with its learning, after 50 and 140 trials in two variables and
-                150 in seven, with input noise and without; medians of 9, the two in turns
+    time        no search: CPU milliseconds of an ask with its learning, and of the next one without, after 50 and 140
+                trials in two variables and 150 in seven, of a sum and of what is none, with input noise and without;
+                medians of 9, the two in turns
 
 Of each problem a run of the default, and one without the part that is named: the model `smooth`, a squared-exponential
 process, or `sums` of processes of one variable, whose particles it then lacks, or in the search the `exchange` of
@@ -24,6 +25,7 @@ import json
 import time
 from contextlib import contextmanager, nullcontext
 from functools import partial
+from itertools import product
 from pathlib import Path
 from unittest import mock
 
@@ -49,6 +51,11 @@ SEEDS = {"landscapes": (330, 117), "separable": (30, 60), "robust": (200, 30), "
 NAMES = {
     "robust": ["needle-3", "many", "gm 0.02", "gm 0.01", "ridge"],
     "smooth": [name for name in smooth_regret.FUNCTIONS if not name.endswith("-wide")],
+}
+#: what an ask is timed on
+TIMED = {
+    "sum": lambda x: np.cos(8.0 * x).sum() + x.sum(),
+    "no sum": lambda x: np.sin(6.0 * x[0]) + x.sum() ** 2,
 }
 SEPARABLE = {
     "all": lambda problem: True,
@@ -112,15 +119,19 @@ def on_robust(name, seed):
     return 100.0 * float(best - problem.function.expectation(np.asarray(answers)[-1:], problem.noise)[0]) / best
 
 
-def ask_seconds(n, d, noise, seed):
-    """Return CPU seconds of an ask after n trials in d variables."""
+def ask_seconds(function, n, d, noise, seed):
+    """Return CPU seconds of an ask after n trials in d variables, and of the next one, which learns nothing anew."""
     rng = np.random.default_rng([seed, n, d])
     optimizer = sh.Optimizer(sh.Box.unit(d), n_initial=1, seed=seed, input_noise=noise)
     for x in rng.random((n, d)):
-        optimizer.tell(x, float(np.sin(6.0 * x[0]) + x.sum() ** 2))
-    started = time.process_time()
-    optimizer.ask()
-    return time.process_time() - started
+        optimizer.tell(x, float(function(x)))
+    times = []
+    for _ in range(2):
+        started = time.process_time()
+        x = optimizer.ask()
+        times.append(time.process_time() - started)
+        optimizer.tell(x, float(function(x)))
+    return times
 
 
 def main():
@@ -168,15 +179,16 @@ def main():
 
 
 def _print_times(part, seeds):
-    for n, d in ((50, 2), (140, 2), (150, 7)):
-        for noise, title in ((None, "without noise"), (sh.InputNoise.unit(0.03), "under noise")):
-            taken = {variant: [] for variant in VARIANTS}
-            for seed in (0, *seeds):  # the first one compiles
-                for variant in VARIANTS:
-                    with searching(variant, part):
-                        taken[variant].append(ask_seconds(n, d, noise, seed))
-            before, now = (1000.0 * np.median(taken[variant][1:]) for variant in VARIANTS)
-            print(f"({n}, {d}) {title:13}  without {before:.1f} ms, with {now:.1f} ms, {now / before:.2f} times")
+    noises = ((None, "without noise"), (sh.InputNoise.unit(0.03), "under noise"))
+    for (kind, function), (n, d), (noise, title) in product(TIMED.items(), ((50, 2), (140, 2), (150, 7)), noises):
+        taken = {variant: [] for variant in VARIANTS}
+        for seed in (0, *seeds):  # the first one compiles
+            for variant in VARIANTS:
+                with searching(variant, part):
+                    taken[variant].append(ask_seconds(function, n, d, noise, seed))
+        before, now = (1000.0 * np.median(taken[variant][1:], axis=0) for variant in VARIANTS)
+        for ask, b, a in zip(("learning", "next"), before, now, strict=True):
+            print(f"{kind} ({n}, {d}) {title:13} {ask:8}  without {b:.1f} ms, with {a:.1f} ms, {a / b:.2f} times")
 
 
 def _kept(run, part, seeds, file):
