@@ -34,19 +34,19 @@ def trials(f, n=60, seed=0):
     return X, f(X)
 
 
-def drawn(kernel, seed):
+def drawn(kernel, seed, length_scale=0.3):
     """Return a function that draws its values at X from a process of one scale."""
 
     def f(X):
-        K = correlation(kernel, X, X, np.full(2, 0.3)) + 1e-10 * np.eye(len(X))
+        K = correlation(kernel, X, X, np.full(2, length_scale)) + 1e-10 * np.eye(len(X))
         return np.linalg.cholesky(K) @ np.random.default_rng(seed + 100).standard_normal(len(X))
 
     return f
 
 
-def particles_of(f, seed=0):
+def particles_of(f, seed=0, n=60):
     """Return how many particles are rough of one scale, smooth, and of two scales."""
-    posterior = GaussianProcess(kernel="matern52_two_scales", mean_variance=1.0).fit(*trials(f, seed=seed)).posterior
+    posterior = GaussianProcess(kernel="matern52_two_scales", mean_variance=1.0).fit(*trials(f, n, seed)).posterior
     a, w = posterior.hyperparameters.inverse_l[:, 2:].T
     alone = w < 1e-20
     return np.sum(alone & (a >= 1e-20)), np.sum(alone & (a < 1e-20)), np.sum(~alone)
@@ -64,6 +64,17 @@ def test_a_rough_function_has_two_scales():
 def test_draws_of_a_process_are_modelled_as_that_process(seed):
     assert particles_of(drawn("squared_exponential", seed), seed)[1] == 10
     assert particles_of(drawn("matern52", seed), seed)[0] >= 8
+
+
+def test_of_twenty_trials_few_rough_functions_are_called_smooth_and_few_smooth_ones_are_not():
+    """By the evidence alone a quarter of the particles of rough draws were smooth, and such a model is too sure."""
+    smooth_particles = {
+        kernel: np.array([particles_of(drawn(kernel, seed, 0.6), seed, 20)[1] for seed in range(20)])
+        for kernel in ("matern52", "squared_exponential")
+    }
+    assert smooth_particles["matern52"].max() < 8
+    assert smooth_particles["matern52"].mean() < 1.0
+    assert smooth_particles["squared_exponential"].mean() > 9.0
 
 
 def test_rough_between_trials_it_predicts_the_trend_and_knows_what_it_does_not_know():

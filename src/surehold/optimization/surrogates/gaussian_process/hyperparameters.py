@@ -24,6 +24,7 @@ from surehold.defaults import (
     SHARE_PRIOR,
     SIGNAL_VARIANCE_PRIOR,
     SLICE_WIDTH,
+    SMOOTH_ODDS,
     THIN,
 )
 from surehold.errors import InputError, unknown_name
@@ -141,7 +142,7 @@ def learn(
 
 
 def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Generator) -> Learnt:
-    """Draw particles of several models, equally likely beforehand.
+    """Draw particles of several models, equally likely beforehand but for the smooth one, which is less so.
 
     They are one rough scale, one smooth scale, two scales, and, where variables are several and not too many, a sum of
     processes of one variable each with a share of one of all of them. Each has as many particles as its evidence
@@ -166,7 +167,9 @@ def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Ge
         models.append(evidence._replace(prior_mean=mean, prior_deviation=deviation))
     found = [mode(model) for model in models]
     known = [log_evidence_and_root(model, center) for model, (center, _) in zip(models, found, strict=True)]
-    keep = shared_out(np.array([log for log, _ in known]), 1 if learning.method == "map" else learning.particles)
+    logs = np.array([log for log, _ in known])
+    logs[list(one_scale).index("squared_exponential")] += SMOOTH_ODDS
+    keep = shared_out(logs, 1 if learning.method == "map" else learning.particles)
     parts, cost = [], sum(evaluations + center.size + 1 for center, evaluations in found)
     for model, (center, _), (_, root), count in zip(models, found, known, keep, strict=True):
         if learning.method == "map":
@@ -182,7 +185,7 @@ def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Ge
 
 
 def shared_out(log_evidences: NDArray[np.float64], count: int) -> list[int]:
-    """Return how many of `count` particles each model has, in proportion to its evidence; NaN is none.
+    """Return how many of `count` particles each model has, in proportion to its evidence and odds; NaN is none.
 
     What is left by rounding down goes to the largest remainders. Without any evidence all go to the first model.
     """
