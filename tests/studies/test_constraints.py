@@ -219,9 +219,12 @@ def test_a_study_learns_of_failures_as_its_optimizer_does(tmp_path, rule):
         held.tell(trial.id, None if failed else float(own.sum()), failed=failed)
         optimizer.tell(own, None if failed else float(own.sum()), failed=failed)
     assert np.any(np.array(asked)[:6, 0] > 0.7), "no trial of the design failed: the test would show nothing"
-    other = sh.Optimizer(space.box, **settings | {"failures": "lowest" if rule == "modelled" else "modelled"})
-    other.restore(optimizer.X[:9], optimizer.y[:9])
-    assert not np.allclose(other.ask(), asked[9])
+    differ = False
+    for k in range(6, 10):
+        other = sh.Optimizer(space.box, **settings | {"failures": "lowest" if rule == "modelled" else "modelled"})
+        other.restore(optimizer.X[:k], optimizer.y[:k])
+        differ |= not np.allclose(other.ask(), asked[k])
+    assert differ, "either rule asks for the same trials: the test would show nothing"
     held.close()
 
 
