@@ -185,9 +185,9 @@ PROPORTION_PRIOR: Final = (log(8.0), 0.7)
 SHARE_PRIOR: Final = (log(0.1), 1.5)
 #: Logarithm of the odds of the smooth model against any other one before the trials. By evidence alone few trials of a
 #: rough function are too often called smooth, and the model is then sure of what it does not know: stated intervals of
-#: the mean covered 0.93 in place of 0.95, which -4 gives, too: python -m benchmarks.calibration --first-seed 10000 --runs 240
-#: --rows "input noise" --dimensions 2. In regret nothing is gained, and GM under little noise loses: python -m
-#: benchmarks.default_parts smooth --without odds --first 30, and robust.
+#: the mean covered 0.93 in place of 0.95, which -4 gives, too: python -m benchmarks.calibration --first-seed 10000
+#: --runs 240 --rows "input noise" --dimensions 2. In regret nothing is gained, and GM under little noise loses: python
+#: -m benchmarks.default_parts smooth --without odds --first 30, and robust.
 SMOOTH_ODDS: Final = -2.0
 #: Variables up to which a sum of processes of one variable each is one of the models. Of many, a hundred trials do not
 #: tell one-dimensional functions: on Styblinski-Tang in 50 one run came to 1,176, those of the process of one scale to
