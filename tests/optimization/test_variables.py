@@ -175,7 +175,7 @@ def test_rules_are_of_the_variables_not_of_their_coordinates():
     for _ in range(12):
         trial = optimizer.ask_trial()
         p = trial.parameters
-        assert p["force"] + p["n"] <= 5.0 + 1e-8
+        assert p["force"] + p["n"] <= 5.0 + 1e-9
         assert gentle(p)
         optimizer.tell(trial, p["force"])
     best = optimizer.recommend().parameters

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
-from surehold.optimization.constraints.linear import Linear
+from surehold.optimization.constraints.linear import ROUNDING, Linear
 from surehold.optimization.variables import Choice
 
 __all__ = ["Rule", "of_coordinates"]
@@ -50,7 +50,7 @@ def of_coordinates(box: Box, rule: Rule) -> Rule:
     def holds(x: NDArray[np.float64]) -> bool:
         values = box.as_dict(x)
         parts = [weight * float(values[name]) for name, weight in rule.weights.items()]
-        slack = 1e-9 * sum(map(abs, parts))
+        slack = ROUNDING * sum(map(abs, parts))
         return bool(low - slack <= sum(parts) <= high + slack)
 
     holds.__name__ = str(rule)

@@ -17,12 +17,11 @@ from surehold.defaults import REGION_KNOWN, REGION_POOL, REGION_SEARCH, REGION_S
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.by_name import Rule, of_coordinates
-from surehold.optimization.constraints.linear import Linear
+from surehold.optimization.constraints.linear import ROUNDING, Linear
 from surehold.optimization.lattice import Lattice
 
 __all__ = ["Region", "checked_rules", "region_of"]
 
-_ROUNDING: Final = 1e-10  # of a linear constraint's largest possible value: an input on its border is allowed
 _SHRINKS: Final = 40  # halvings, on average, of a chord before a step is given up
 
 
@@ -98,7 +97,7 @@ class Region:
         upper = np.array([np.inf if rule.upper is None else rule.upper for rule in linear])
         base = rows @ box.lower  # w'x = w'(lower + widths u)
         self._A: Final = rows * box.widths  # (c, d)
-        slack = _ROUNDING * (np.abs(rows) @ np.maximum(np.abs(box.lower), np.abs(box.upper)))
+        slack = ROUNDING * (np.abs(rows) @ np.maximum(np.abs(box.lower), np.abs(box.upper)))
         self._low: Final = lower - base - slack
         self._high: Final = upper - base + slack
         self._texts: Final = tuple(str(rule) for rule in linear)

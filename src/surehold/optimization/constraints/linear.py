@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
 
-__all__ = ["Linear"]
+__all__ = ["ROUNDING", "Linear"]
+
+ROUNDING: Final = 1e-10  # of a constraint's largest values: an input on its border is allowed
 
 _NUMBER: Final = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _TERM: Final = re.compile(rf"\s*([+-]?)\s*(?:({_NUMBER})\s*\*?\s*)?([^\W\d][\w.]*)?\s*")
