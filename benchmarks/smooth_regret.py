@@ -7,11 +7,14 @@ initial ones, the same for every method, seed by seed. No noise anywhere; peers 
 are mean and standard error of log10 of the regret (known maximum minus best observed, at least 1e-9) at half and full
 budget, and the paired difference at full budget from the first method. Ackley is on [-14, 26]^4: in its usual box the
 optimum is the center, where some methods begin. The functions named -wide are on larger boxes. The method as-told is
-the default without what `optimization.low_tail` does to deep values.
+the default without what `optimization.low_tail` does to deep values. `--rows FILE` keeps the runs, a line each, and
+those that it holds are not made again.
 """
 
 import argparse
+import json
 import time
+from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -125,6 +128,22 @@ def run(name, method, seed):
     return np.log10(regret[budget // 2 - 1]), np.log10(regret[-1]), time.process_time() - started
 
 
+def _kept(name, method, seeds, file, processes):
+    """Return what the run of each seed found, those of a file included."""
+    known = {}
+    if file is not None and file.exists():
+        rows = map(json.loads, file.read_text(encoding="utf-8").splitlines())
+        known = {seed: found for f, m, seed, *found in rows if (f, m) == (name, method)}
+    missing = [seed for seed in seeds if seed not in known]
+    runs = Parallel(n_jobs=processes, return_as="generator")(delayed(run)(name, method, seed) for seed in missing)
+    for seed, found in zip(missing, runs, strict=True):
+        known[seed] = [float(number) for number in found]
+        if file is not None:
+            with file.open("a", encoding="utf-8") as kept:
+                print(json.dumps([name, method, seed, *known[seed]]), file=kept)
+    return [known[seed] for seed in seeds]
+
+
 def main():
     parser = argparse.ArgumentParser(description="Plain runs on smooth functions, where precision counts.")
     parser.add_argument("--seeds", type=int, default=20, help="number of seeds, 2 or more")
@@ -135,17 +154,15 @@ def main():
     methods = [*OURS, *installed_peers()]
     parser.add_argument("--methods", nargs="+", default=methods, choices=methods)
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--rows", type=Path, help="file of the runs, a line each")
     arguments = parser.parse_args()
+    seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
     print(f"{arguments.seeds} seeds; log10 of the regret")
     print(f"{'function':18} {'method':22} {'half':>15} {'full':>15} {'- first':>15} {'CPU s':>6}")
     for name in arguments.functions:
         reference = None
         for method in arguments.methods:
-            jobs = (
-                delayed(run)(name, method, seed)
-                for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
-            )
-            half, full, seconds = np.array(Parallel(n_jobs=arguments.processes)(jobs)).T
+            half, full, seconds = np.array(_kept(name, method, seeds, arguments.rows, arguments.processes)).T
             reference = full if reference is None else reference
             parts = [
                 f"{v.mean():7.2f} ({v.std(ddof=1) / np.sqrt(len(v)):5.2f})" for v in (half, full, full - reference)
