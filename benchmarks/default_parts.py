@@ -14,11 +14,11 @@
                 medians of 9, the two in turns
 
 Of each problem a run of the default, and one without the part that is named: the model `smooth`, a squared-exponential
-process, or `sums` of processes of one variable, whose particles it then lacks, the `odds` against the smooth model, or
-in the search the `exchange` of single variables; with the same initial design. Printed are means with standard errors,
-the paired difference and, of regrets in per cent, runs within 1 %, the difference of the logarithm (base 10; regrets
-below 0.01 % count as that), and how many runs come within 1 % with the part that do not without it, and the other way
-round.
+process, or `sums` of processes of one variable, whose particles it then lacks, the `odds` against the smooth model, the
+`least` length-scale of it, or in the search the `exchange` of single variables; with the same initial design. Printed
+are means with standard errors, the paired difference and, of regrets in per cent, runs within 1 %, the difference of
+the logarithm (base 10; regrets below 0.01 % count as that), and how many runs come within 1 % with the part that do not
+without it, and the other way round.
 """
 
 import argparse
@@ -82,6 +82,7 @@ def searching(variant, part):
         "smooth": mock.patch.multiple(hyperparameters, mode=mode, log_evidence_and_root=log_evidence_and_root),
         "sums": mock.patch.object(hyperparameters, "ADDITIVE_UP_TO", 0),
         "odds": mock.patch.object(hyperparameters, "SMOOTH_ODDS", 0.0),
+        "least": mock.patch.object(hyperparameters, "SMOOTH_LEAST", 1e-300),
         "exchange": mock.patch.object(multistart, "FEW_VARIABLES", np.inf),
     }
     with absent[part] if variant == "without" else nullcontext():
@@ -139,9 +140,8 @@ def ask_seconds(function, n, d, noise, seed):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("subject", choices=list(SEEDS))
-    parser.add_argument(
-        "--without", choices=("smooth", "sums", "odds", "exchange"), default="sums", help="what the one run lacks"
-    )
+    parts = ("smooth", "sums", "odds", "least", "exchange")
+    parser.add_argument("--without", choices=parts, default="sums", help="what the one run lacks")
     parser.add_argument("--first", type=int, help="first seed, or its number in the set")
     parser.add_argument("--count", type=int, help="seeds")
     parser.add_argument(

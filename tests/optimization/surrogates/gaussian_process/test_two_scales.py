@@ -77,6 +77,24 @@ def test_of_twenty_trials_few_rough_functions_are_called_smooth_and_few_smooth_o
     assert smooth_particles["squared_exponential"].mean() > 9.0
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_white_noise_along_a_variable_is_not_called_smooth(seed, monkeypatch):
+    """Trials in forty columns that tell nothing of each other: the evidence alone would be for the smooth model."""
+
+    def columns(length_scale):
+        rng = np.random.default_rng(seed)
+        X = np.column_stack([rng.integers(40, size=100) / 39.0, rng.random(100)])
+        K = correlation("squared_exponential", X, X, np.array([length_scale, 0.4])) + 1e-10 * np.eye(100)
+        y = np.linalg.cholesky(K) @ rng.standard_normal(100)
+        posterior = GaussianProcess(kernel="matern52_two_scales", mean_variance=1.0).fit(X, y).posterior
+        return np.sum(np.all(posterior.hyperparameters.inverse_l[:, 2:] < 1e-20, axis=1))
+
+    assert columns(0.004) == 0
+    assert columns(0.05) == 10
+    monkeypatch.setattr(hyperparameters, "SMOOTH_LEAST", 1e-9)
+    assert columns(0.004) >= 9
+
+
 def test_rough_between_trials_it_predicts_the_trend_and_knows_what_it_does_not_know():
     """One stationary process calls the trend noise-free and short; at fresh inputs it errs more."""
     X, y = trials(rough)
