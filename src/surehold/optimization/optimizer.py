@@ -86,9 +86,9 @@ class Optimizer(Record):
         Non-negative integer.
     noise
         Observation noise of "two_scales", "gp" and "tgp": "none" (what None, the default, stands for), its standard
-        deviation in the outputs' units, "inferred", "heteroscedastic" (inferred, differing from place to place), or
-        "told": each trial tells its own, `tell(x, y, noise=0.2)`. A surrogate object and a thesis preset have their
-        own: there it must be None, not given.
+        deviation in the outputs' units, "inferred", "heteroscedastic" (inferred, differing from place to place once
+        the trials show it), or "told": each trial tells its own, `tell(x, y, noise=0.2)`. A surrogate object and a
+        thesis preset have their own: there it must be None, not given.
     output_range
         (lowest, highest) value to expect, if known; None (default) where it is not, and beside a surrogate object or a
         thesis preset.

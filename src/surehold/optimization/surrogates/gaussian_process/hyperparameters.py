@@ -126,10 +126,12 @@ def learn(
 ) -> Learnt:
     """Draw particles of the posterior of theta given the evidence.
 
-    `previous` (p,) is the last particle of the posterior before, from which "slice" goes on.
+    `previous` is the last particle of the posterior before, from which "slice" goes on if it is one of the same model
+    (p,): noise that varies is known to do so from some trial on.
     """
     if learning.method == "slice":
-        start = np.ones(evidence.prior_mean.size) if previous is None else previous
+        p = evidence.prior_mean.size
+        start = np.ones(p) if previous is None or previous.size != p else previous
         counts = {"keep": learning.particles, "burn_in": learning.burn_in, "thin": learning.thin}
         samples = slice_sample(log_posterior, evidence, start, rng, widths=learning.width, **counts)
         return Learnt(samples.states, samples.evaluations)

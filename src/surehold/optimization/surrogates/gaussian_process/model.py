@@ -20,7 +20,7 @@ from surehold.defaults import (
 )
 from surehold.errors import InputError
 from surehold.optimization.numerics.threads import computing
-from surehold.optimization.surrogates.gaussian_process.heteroscedastic import most_likely_noise
+from surehold.optimization.surrogates.gaussian_process.heteroscedastic import with_learnt_noise
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
     Learning,
     Learnt,
@@ -65,8 +65,8 @@ class GaussianProcess:
     noise
         Standard deviation of the observation noise: "none" (default) for a function that gives the same answer
         again, a number in the outputs' units, "inferred" for one common standard deviation that is learnt, or
-        "heteroscedastic" for one that differs from place to place and is learnt. Known standard deviations of single
-        observations are an argument of `fit`.
+        "heteroscedastic" for one that differs from place to place and is learnt; it is as "inferred" until the
+        observations show a difference. Known standard deviations of single observations are an argument of `fit`.
     ratio
         Nugget on the diagonal of the data's covariance, as a fraction of the signal variance: what keeps it
         factorizable.
@@ -277,8 +277,7 @@ class GaussianProcess:
             particles = self._fixed(evidence)[None, :]
         else:
             if self._noise == "heteroscedastic" and noise is None and not outputs.flat:
-                variances, log_noise = most_likely_noise(evidence)
-                evidence = evidence._replace(noise=variances)
+                evidence, log_noise = with_learnt_noise(evidence)
             particles, cost = self._learn(evidence, outputs, rng, start)
         return GaussianProcessPosterior(evidence.first_block(), particles, outputs, cost, log_noise=log_noise)
 
