@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
+from scipy import special
+from scipy.stats import qmc
 
 import surehold as sh
 from surehold.errors import InputError
 from surehold.optimization.surrogates.local_global.model import LocalGlobalProcess
-from surehold.optimization.surrogates.noisy_inputs import averaging, condition_on_noisy_inputs
+from surehold.optimization.surrogates.noisy_inputs import by_straying, condition_on_noisy_inputs
 
 BOX = sh.Box({"x": (0.0, 2.0), "y": (0.0, 5.0)})
 
@@ -99,6 +101,24 @@ def test_a_hill_is_not_learnt_as_its_average(noise):
     assert abs((found.mean.mean(axis=0) - f)[inside].mean()) < 0.03
 
 
+def test_what_straying_does_to_a_quadratic_function_is_what_scipy_draws():
+    """Mean and variance along the axes of the noise; each axis has a slope and a curvature."""
+    rng = np.random.default_rng(4)
+    X = rng.random((60, 2))
+    slope, curvature, deviations = np.array([0.6, -0.3]), np.array([-9.0, 5.0]), np.array([0.08, 0.05])
+
+    def f(x):
+        return x @ slope + 0.5 * (x - 0.5) ** 2 @ curvature
+
+    posterior = sh.GaussianProcess(kernel="squared_exponential").fit(X, f(X)).posterior
+    inner = np.array([[0.5, 0.5], [0.3, 0.6], [0.6, 0.35]])
+    added, variance = by_straying(posterior, inner, np.broadcast_to(np.diag(deviations), (3, 2, 2)))
+    np.testing.assert_allclose(added, 0.5 * curvature @ deviations**2, rtol=0.02)
+    normals = special.ndtri(qmc.Sobol(2, seed=0).random(2**14))
+    outcomes = f(inner[:, None, :] + deviations * normals)
+    np.testing.assert_allclose(variance, outcomes.var(axis=1), rtol=0.02)
+
+
 def test_what_averaging_adds_is_half_the_trace_of_hessian_times_covariance():
     rng = np.random.default_rng(4)
     X = rng.random((60, 2))
@@ -106,5 +126,5 @@ def test_what_averaging_adds_is_half_the_trace_of_hessian_times_covariance():
     y = 0.5 * np.einsum("ni,ij,nj->n", X - 0.5, hessian, X - 0.5)
     posterior = sh.GaussianProcess(kernel="squared_exponential").fit(X, y).posterior
     inner = X[np.all(np.abs(X - 0.5) < 0.3, axis=1)]
-    added = averaging(posterior, inner, np.broadcast_to(root, (len(inner), 2, 2)))
+    added, _ = by_straying(posterior, inner, np.broadcast_to(root, (len(inner), 2, 2)))
     np.testing.assert_allclose(added, 0.5 * np.trace(hessian @ root @ root.T), rtol=0.05)

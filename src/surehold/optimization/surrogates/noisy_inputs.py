@@ -2,14 +2,16 @@
 
 Legend
     X, y     commanded inputs (n, d) in the unit cube, and values (n,)
-    S        covariance of the input noise, R R' = S, (d, d)
-    slope    gradient of the model's mean at an input, (d,)
+    S        covariance of the input noise, R R' = S, (d, d); R has e columns
+    z        independent standard normals (e,), of which the input noise is R z
+    a, b     the model's mean along a column of R is m + a z + b z^2, (n, e) of each particle
 
-To first order y = f(x + xi) = f(x) + slope' xi: a trial that strayed looks like one with an observation noise of
-variance slope' S slope, large where the function is steep (McHutchon and Rasmussen 2011, equation 5). To second order
-its mean is not f(x) either, but f averaged over the noise, lower on a hill and higher in a hollow: the model would
-learn the averaged function, and whoever averages it again would promise too little. What averaging changes, by the
-model of the round before, is therefore taken off the values.
+A trial that strayed looks like one with an observation noise, large where the function is steep: to first order of
+variance slope' S slope (McHutchon and Rasmussen 2011, equation 5), to second order, here by single columns of R, the
+sum of a^2 + 2 b^2. On the top of a hill, where the answer is, the slope says that nothing strays. To second order its
+mean is not f(x) either, but f averaged over the noise, lower on a hill and higher in a hollow: the model would learn
+the averaged function, and whoever averages it again would promise too little. What averaging changes, the sum of b, by
+the model of the round before, is therefore taken off the values.
 """
 
 import numpy as np
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from surehold.defaults import SLOPE_ROUNDS
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior
 
-__all__ = ["averaging", "condition_on_noisy_inputs"]
+__all__ = ["by_straying", "condition_on_noisy_inputs"]
 
 
 def condition_on_noisy_inputs(
@@ -52,23 +54,27 @@ def condition_on_noisy_inputs(
         noise = np.hypot(known, spread * np.minimum(2.0 * size, 1.0))  # before slopes are known: those of half the box
     posterior = surrogate.condition(X, y, np.random.default_rng(seed), None, noise)
     for following in range(2, SLOPE_ROUNDS + 1):
+        added, variance = by_straying(posterior, X, roots)
         if known is not None:
-            slopes = np.asarray(posterior.moments(X, gradient=True).mean_gradient).mean(axis=0)  # (n, d)
-            noise = np.sqrt(known**2 + np.square(np.einsum("nde,nd->ne", roots, slopes)).sum(axis=1))
+            noise = np.sqrt(known**2 + variance)
         # The first round knows no slopes and bends after the noise: what it says of averaging is left out.
-        values = y - averaging(posterior, X, roots) if following > 2 or known is None else y
+        values = y - added if following > 2 or known is None else y
         posterior = surrogate.condition(X, values, np.random.default_rng(seed), None, noise)
     return posterior
 
 
-def averaging(posterior: Posterior, X: NDArray[np.float64], roots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what averaging over the input noise adds to the model's mean at each input, (n,).
+def by_straying(
+    posterior: Posterior, X: NDArray[np.float64], roots: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what the input noise adds to the mean of the outcome at each input, and its variance, (n,) each.
 
-    By three points of Gauss-Hermite quadrature along each column of the root: exact for sums of functions of one
-    column, to the fifth degree.
+    Both are means over the particles, from three points along each column of the root: exact for sums of quadratic
+    functions of one column.
     """
     n, d = X.shape
     steps = np.sqrt(3.0) * np.swapaxes(roots, 1, 2)  # (n, e, d)
-    offsets = np.concatenate([np.zeros((n, 1, d)), steps, -steps], axis=1)
-    weights = np.r_[-d / 3.0, np.full(2 * d, 1.0 / 6.0)]
-    return posterior.average(X, offsets, weights).mean.mean(axis=0)
+    points = X[:, None, :] + np.concatenate([np.zeros((n, 1, d)), steps, -steps], axis=1)
+    means = np.asarray(posterior.moments(points.reshape(-1, d)).mean).reshape(-1, n, 1 + 2 * steps.shape[1])
+    middle, ahead, behind = np.split(means, [1, 1 + steps.shape[1]], axis=2)
+    a, b = (ahead - behind) / np.sqrt(12.0), (ahead + behind - 2.0 * middle) / 6.0  # (m, n, e)
+    return b.sum(axis=2).mean(axis=0), (a**2 + 2.0 * b**2).sum(axis=2).mean(axis=0)
