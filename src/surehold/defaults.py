@@ -189,10 +189,11 @@ SHARE_PRIOR: Final = (log(0.1), 1.5)
 #: --runs 240 --rows "input noise" --dimensions 2. In regret nothing is gained, and GM under little noise loses: python
 #: -m benchmarks.default_parts smooth --without odds --first 30, and robust.
 SMOOTH_ODDS: Final = -2.0
-#: Length-scale, in box widths, below which the smooth model is none: it would be white noise along that variable.
-#: Without this limit the largest error of the model on forty grasps was 0.64 in place of 0.53: python -m
-#: benchmarks.model_error. On 117 landscapes it matters in eight runs, whose answers are as near or nearer with it:
-#: python -m benchmarks.default_parts landscapes --without least. Never measured against other numbers.
+#: The smooth model is none if a length-scale is below this, in box widths, and below the mean gap of the trials along
+#: that variable, 1/n: it would be white noise there. Without this limit the largest error of the model on forty grasps
+#: was 0.64 in place of 0.53: python -m benchmarks.model_error. On 117 landscapes it matters in eight runs, whose
+#: answers are as near or nearer with it: python -m benchmarks.default_parts landscapes --without least. Never measured
+#: against other numbers.
 SMOOTH_LEAST: Final = 0.02
 #: Variables up to which a sum of processes of one variable each is one of the models. Of many, a hundred trials do not
 #: tell one-dimensional functions: on Styblinski-Tang in 50 one run came to 1,176, those of the process of one scale to

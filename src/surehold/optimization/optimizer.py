@@ -111,9 +111,9 @@ class Optimizer(Record):
     noise_while_exploring
         Where the input noise acts. False (default): only when the answer is used; trials reach what is commanded, as in
         a simulator. True: trials stray, too. Those whose reached input is told (`tell(x, y, reached=...)`) are learnt
-        from where they were; the others count as less precise where the function is steep (McHutchon and Rasmussen
-        2011; left out where observation noise is inferred, which contains it). Needs a surrogate that takes the noise
-        of single trials: "two_scales", "gp", "tgp" or such an object.
+        from where they were; the others count as less precise where the function is steep or bends (McHutchon and
+        Rasmussen 2011; left out where observation noise is inferred, which contains it). Needs a surrogate that takes
+        the noise of single trials: "two_scales", "gp", "tgp" or such an object.
     trust_region
         Whether the next trial is sought in a box around the best one that grows with success and shrinks without
         (after TuRBO): an option for six variables and more; off by default.

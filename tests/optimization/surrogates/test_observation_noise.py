@@ -114,6 +114,20 @@ def test_common_noise_is_learnt_as_one_level(n):
     assert np.mean(found) > 0.8
 
 
+@pytest.mark.parametrize(
+    ("settings", "X", "y"),
+    [
+        ({}, [[0.5]], [1.0]),
+        ({}, np.linspace(0, 1, 6)[:, None], np.ones(6)),
+        ({"length_scales": [0.2]}, np.linspace(0, 1, 6)[:, None], [0.0, 1.0, 0.5, 2.0, 1.0, 0.0]),
+    ],
+)
+def test_where_nothing_can_be_learnt_noise_is_possible_all_the_same(settings, X, y):
+    model = GaussianProcess(noise="heteroscedastic", **settings).fit(X, y)
+    assert model.noise_std(X).min() > 0.05
+    assert model.predict(X, return_std=True)[1].min() > 0.05
+
+
 def test_noise_that_grows_tenfold_is_learnt_from_a_hundred_observations():
     models = [GaussianProcess(noise="heteroscedastic").fit(*noisy_data(100, seed), seed) for seed in range(6)]
     assert all(model.posterior.log_noise is not None for model in models)

@@ -2,9 +2,9 @@
 
 Legend
     X, y     commanded inputs (n, d) in the unit cube, and values (n,)
-    S        covariance of the input noise, R R' = S, (d, d); R has e columns
-    z        independent standard normals (e,), of which the input noise is R z
-    a, b     the model's mean along a column of R is m + a z + b z^2, (n, e) of each particle
+    S        covariance of the input noise, R R' = S, (d, d)
+    z        independent standard normals (d,), of which the input noise is R z
+    a, b     the model's mean along a column of R is m + a z + b z^2, (n, d) of each particle
 
 A trial that strayed looks like one with an observation noise, large where the function is steep: to first order of
 variance slope' S slope (McHutchon and Rasmussen 2011, equation 5), to second order, here by single columns of R, the
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.defaults import SLOPE_ROUNDS
-from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior
+from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, means
 
 __all__ = ["by_straying", "condition_on_noisy_inputs"]
 
@@ -33,7 +33,7 @@ def condition_on_noisy_inputs(
 ) -> Posterior:
     """Return the surrogate conditioned on trials whose inputs strayed.
 
-    Where the surrogate learns the observation noise, what comes of slopes is part of it.
+    Where the surrogate learns the observation noise, what comes of slopes and curvature is part of it.
 
     Parameters
     ----------
@@ -69,12 +69,13 @@ def by_straying(
     """Return what the input noise adds to the mean of the outcome at each input, and its variance, (n,) each.
 
     Both are means over the particles, from three points along each column of the root: exact for sums of quadratic
-    functions of one column.
+    functions of one column. Of more than `defaults.MANY` trials each point is answered from neighbors of its own, and
+    the curvature is known less exactly.
     """
     n, d = X.shape
-    steps = np.sqrt(3.0) * np.swapaxes(roots, 1, 2)  # (n, e, d)
+    steps = np.sqrt(3.0) * np.swapaxes(roots, 1, 2)  # (n, d, d), column by column
     points = X[:, None, :] + np.concatenate([np.zeros((n, 1, d)), steps, -steps], axis=1)
-    means = np.asarray(posterior.moments(points.reshape(-1, d)).mean).reshape(-1, n, 1 + 2 * steps.shape[1])
-    middle, ahead, behind = np.split(means, [1, 1 + steps.shape[1]], axis=2)
-    a, b = (ahead - behind) / np.sqrt(12.0), (ahead + behind - 2.0 * middle) / 6.0  # (m, n, e)
+    outcomes = np.asarray(means(posterior, points.reshape(-1, d))).reshape(-1, n, 1 + 2 * d)
+    middle, ahead, behind = np.split(outcomes, [1, 1 + d], axis=2)
+    a, b = (ahead - behind) / np.sqrt(12.0), (ahead + behind - 2.0 * middle) / 6.0  # (m, n, d)
     return b.sum(axis=2).mean(axis=0), (a**2 + 2.0 * b**2).sum(axis=2).mean(axis=0)

@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.defaults import (
-    NOISE_VARIANCE_PRIOR,
     VARYING_NOISE_CONVERGED,
     VARYING_NOISE_LENGTH_SCALE,
     VARYING_NOISE_LENGTH_SCALE_DEVIATION,
@@ -44,13 +43,15 @@ _WORKING_VARIANCE: Final = 2.0  # of the log of a squared normal error, by Fishe
 _LEVEL_VARIANCE: Final = 25.0  # prior variance of the mean of g: any level
 
 
-def with_learnt_noise(evidence: Evidence) -> tuple[Evidence, GaussianProcessPosterior | None]:
+def with_learnt_noise(common: Evidence) -> tuple[Evidence, GaussianProcessPosterior | None]:
     """Return the evidence with the noise variances r of the observations, and the posterior of g = log r.
 
-    Where the observations do not show that it varies, it is the evidence whose last hyperparameter is one noise
-    variance common to all, and no posterior. The given evidence is that of f in standardized units; the noise it holds
-    is not looked at.
+    Given is the evidence of f, in standardized units, whose last hyperparameter is one noise variance common to all
+    observations. Where they do not show that it varies, it is returned as it is, and no posterior.
     """
+    evidence = common._replace(
+        prior_mean=common.prior_mean[:-1], prior_deviation=common.prior_deviation[:-1], learn_noise=False
+    )
     X, y = evidence.X, evidence.y
     n, d = X.shape
     prior_mean, prior_deviation = Prior(
@@ -70,12 +71,6 @@ def with_learnt_noise(evidence: Evidence) -> tuple[Evidence, GaussianProcessPost
         kernel=0 if evidence.kernel == TWO_SCALES else evidence.kernel,  # noise varies at one scale
         learn_signal=True,
         learn_noise=False,
-    )
-    common = evidence._replace(
-        noise=np.zeros(n),
-        prior_mean=np.append(evidence.prior_mean, NOISE_VARIANCE_PRIOR[0]),
-        prior_deviation=np.append(evidence.prior_deviation, NOISE_VARIANCE_PRIOR[1]),
-        learn_noise=True,
     )
     g = np.full(n, mode(common)[0][-1])
     steps = 0

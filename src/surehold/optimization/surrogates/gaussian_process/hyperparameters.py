@@ -151,7 +151,8 @@ def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Ge
     processes of one variable each with a share of one of all of them. Each has as many particles as its evidence
     p(y | model) says (Laplace's method, MacKay 2003, section 27), so that a function of one scale is modelled as if
     there were no second one, one that all derivatives exist of (squared exponential) as such, and one whose variables
-    do not interact is known where no trial has been. A smooth model of a length-scale below SMOOTH_LEAST has none.
+    do not interact is known where no trial has been. A smooth model has none if along some variable its length-scale is
+    below SMOOTH_LEAST and the mean gap of the trials, which then tell it nothing of each other.
     """
     d = evidence.X.shape[1]
     shape = [d, d + 1]
@@ -172,7 +173,8 @@ def _learn_by_evidence(evidence: Evidence, learning: Learning, rng: np.random.Ge
     known = [log_evidence_and_root(model, center) for model, (center, _) in zip(models, found, strict=True)]
     logs = np.array([log for log, _ in known])
     smooth = list(one_scale).index("squared_exponential")
-    logs[smooth] += SMOOTH_ODDS if found[smooth][0][:d].min() >= log(SMOOTH_LEAST) else np.nan
+    least = min(SMOOTH_LEAST, 1.0 / len(evidence.y))
+    logs[smooth] += SMOOTH_ODDS if found[smooth][0][:d].min() >= log(least) else np.nan
     keep = shared_out(logs, 1 if learning.method == "map" else learning.particles)
     parts, cost = [], sum(evaluations + center.size + 1 for center, evaluations in found)
     for model, (center, _), (_, root), count in zip(models, found, known, keep, strict=True):

@@ -318,7 +318,8 @@ class GaussianProcess:
         if self._length_scales is not None and self._length_scales.shape not in ((), (1,), (d,)):
             raise InputError(f"length_scales have shape {self._length_scales.shape}; the inputs need ({d},).")
         known = noise if noise is not None else np.full(len(y), 0.0 if isinstance(self._noise, str) else self._noise)
-        learn_signal, learn_noise = self._signal_variance is None, self._noise == "inferred" and noise is None
+        learn_signal = self._signal_variance is None
+        learn_noise = self._noise in ("inferred", "heteroscedastic") and noise is None
         prior = self._prior or Prior((log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION))
         prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise, self._kernel)
         return Evidence(
