@@ -23,7 +23,7 @@ from scipy.stats import qmc
 import surehold as sh
 
 DIMENSIONS = (1, 2, 4, 6)
-INPUT_NOISE = 0.04
+INPUT_NOISE, WIDE_NOISE = 0.04, 0.1
 #: name of a row -> (settings of the optimizer, standard deviation of the observations)
 ROWS: dict[str, tuple[dict[str, Any], float]] = {
     "plain": ({}, 0.0),
@@ -33,6 +33,7 @@ ROWS: dict[str, tuple[dict[str, Any], float]] = {
     "heteroscedastic .1": ({"noise": "heteroscedastic"}, 0.1),
     "input noise": ({"input_noise": sh.InputNoise.unit(INPUT_NOISE)}, 0.0),
     "straying": ({"input_noise": sh.InputNoise.unit(INPUT_NOISE), "noise_while_exploring": True}, 0.0),
+    "straying .1": ({"input_noise": sh.InputNoise.unit(WIDE_NOISE), "noise_while_exploring": True}, 0.0),
 }
 
 
@@ -52,13 +53,14 @@ def one(row: str, d: int, seed: int) -> tuple[float, float, float]:
     f = random_function(d, rng)
     box = sh.Box({f"x{i}": (0.0, 1.0) for i in range(d)})
     optimizer = sh.Optimizer(box, seed=seed, **settings)
-    straying = settings.get("noise_while_exploring", False)
+    noise = settings.get("input_noise")
+    spread = 0.0 if noise is None else float(np.sqrt(noise.unit_covariance(box)[0, 0]))
+    strays = spread * settings.get("noise_while_exploring", False)
     for _ in range(10 + 10 * d):
         x = optimizer.ask()
-        at = x + (INPUT_NOISE * rng.standard_normal(d) if straying else 0.0)
+        at = x + (strays * rng.standard_normal(d) if strays else 0.0)
         optimizer.tell(x, float(f(at[None])[0]) + deviation * rng.standard_normal())
     best = optimizer.recommend()
-    spread = INPUT_NOISE if "input_noise" in settings else 0.0
     normals = special.ndtri(qmc.Sobol(d + 1, seed=rng).random(4096))
     means = f(best.x + spread * normals[:, :d])
     executions = means + deviation * normals[:, d]

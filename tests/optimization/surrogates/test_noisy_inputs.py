@@ -5,6 +5,7 @@ from scipy.stats import qmc
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.optimization.surrogates import noisy_inputs
 from surehold.optimization.surrogates.local_global.model import LocalGlobalProcess
 from surehold.optimization.surrogates.noisy_inputs import by_straying, condition_on_noisy_inputs
 
@@ -101,8 +102,9 @@ def test_a_hill_is_not_learnt_as_its_average(noise):
     assert abs((found.mean.mean(axis=0) - f)[inside].mean()) < 0.03
 
 
-def test_what_straying_does_to_a_quadratic_function_is_what_scipy_draws():
-    """Mean and variance along the axes of the noise; each axis has a slope and a curvature."""
+def test_what_straying_does_to_a_quadratic_function_is_what_scipy_draws(monkeypatch):
+    """Mean and variance along the axes of the noise; each axis has a slope and a curvature, all of which is counted."""
+    monkeypatch.setattr(noisy_inputs, "CURVATURE_WEIGHT", 2.0)
     rng = np.random.default_rng(4)
     X = rng.random((60, 2))
     slope, curvature, deviations = np.array([0.6, -0.3]), np.array([-9.0, 5.0]), np.array([0.08, 0.05])
@@ -117,6 +119,13 @@ def test_what_straying_does_to_a_quadratic_function_is_what_scipy_draws():
     normals = special.ndtri(qmc.Sobol(2, seed=0).random(2**14))
     outcomes = f(inner[:, None, :] + deviations * normals)
     np.testing.assert_allclose(variance, outcomes.var(axis=1), rtol=0.02)
+
+
+def test_on_top_of_a_hill_a_trial_that_strays_is_noisy():
+    X = np.linspace(0.0, 1.0, 25)[:, None]
+    posterior = sh.GaussianProcess(kernel="squared_exponential").fit(X, -8.0 * (X[:, 0] - 0.5) ** 2).posterior
+    _, variance = by_straying(posterior, np.array([[0.5]]), np.full((1, 1, 1), 0.1))
+    assert variance[0] == pytest.approx(noisy_inputs.CURVATURE_WEIGHT * 0.08**2, rel=0.02)
 
 
 def test_what_averaging_adds_is_half_the_trace_of_hessian_times_covariance():

@@ -8,16 +8,17 @@ Legend
 
 A trial that strayed looks like one with an observation noise, large where the function is steep: to first order of
 variance slope' S slope (McHutchon and Rasmussen 2011, equation 5), to second order, here by single columns of R, the
-sum of a^2 + 2 b^2. On the top of a hill, where the answer is, the slope says that nothing strays. To second order its
-mean is not f(x) either, but f averaged over the noise, lower on a hill and higher in a hollow: the model would learn
-the averaged function, and whoever averages it again would promise too little. What averaging changes, the sum of b, by
-the model of the round before, is therefore taken off the values.
+sum of a^2 + 2 b^2. On the top of a hill, where the answer is, the slope says that nothing strays. All of 2 b^2, as if
+it were normal noise, flattens hills under wide noise: a part counts. To second order the mean of the trial is not f(x)
+either, but f averaged over the noise, lower on a hill and higher in a hollow: the model would learn the averaged
+function, and whoever averages it again would promise too little. What averaging changes, the sum of b, by the model of
+the round before, is therefore taken off the values.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import SLOPE_ROUNDS
+from surehold.defaults import CURVATURE_WEIGHT, SLOPE_ROUNDS
 from surehold.optimization.surrogates.protocol import NoisySurrogate, Posterior, means
 
 __all__ = ["by_straying", "condition_on_noisy_inputs"]
@@ -66,7 +67,7 @@ def condition_on_noisy_inputs(
 def by_straying(
     posterior: Posterior, X: NDArray[np.float64], roots: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what the input noise adds to the mean of the outcome at each input, and its variance, (n,) each.
+    """Return what straying adds to the mean of the outcome at each input, and the variance it counts as, (n,) each.
 
     Both are means over the particles, from three points along each column of the root: exact for sums of quadratic
     functions of one column. Of more than `defaults.MANY` trials each point is answered from neighbors of its own, and
@@ -78,4 +79,4 @@ def by_straying(
     outcomes = np.asarray(means(posterior, points.reshape(-1, d))).reshape(-1, n, 1 + 2 * d)
     middle, ahead, behind = np.split(outcomes, [1, 1 + d], axis=2)
     a, b = (ahead - behind) / np.sqrt(12.0), (ahead + behind - 2.0 * middle) / 6.0  # (m, n, d)
-    return b.sum(axis=2).mean(axis=0), (a**2 + 2.0 * b**2).sum(axis=2).mean(axis=0)
+    return b.sum(axis=2).mean(axis=0), (a**2 + CURVATURE_WEIGHT * b**2).sum(axis=2).mean(axis=0)
