@@ -22,7 +22,6 @@ without it, and the other way round.
 """
 
 import argparse
-import json
 import time
 from contextlib import contextmanager, nullcontext
 from functools import partial
@@ -37,6 +36,7 @@ from threadpoolctl import threadpool_limits
 import surehold as sh
 from benchmarks import robust_regret, smooth_regret
 from benchmarks.generated_landscapes import BUDGETS, SHAPES, landscape
+from benchmarks.kept_runs import keep, kept
 from benchmarks.search_variants import begun, regret
 from benchmarks.separable_functions import separable
 from surehold.optimization.maximizer import multistart
@@ -195,17 +195,13 @@ def _print_times(part, seeds):
 
 def _kept(run, part, seeds, file):
     """Return {seed: what the run of each variant found}, those of a file included."""
-    known = {}
-    if file is not None and file.exists():
-        known = {(seed, variant): found for seed, variant, found in map(json.loads, file.open())}
+    known = kept(file)
     for seed in seeds:
         for variant in VARIANTS:
             if (seed, variant) not in known:
                 with searching(variant, part):
                     known[seed, variant] = run(seed)
-                if file is not None:
-                    with file.open("a") as kept:
-                        print(json.dumps([seed, variant, known[seed, variant]]), file=kept)
+                keep(file, (seed, variant), known[seed, variant])
     wanted = seeds or {seed for seed, _ in known if all((seed, variant) in known for variant in VARIANTS)}
     return {seed: [known[seed, variant] for variant in VARIANTS] for seed in wanted}
 

@@ -12,7 +12,6 @@ those that it holds are not made again.
 """
 
 import argparse
-import json
 import time
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from joblib import Parallel, delayed
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
+from benchmarks.kept_runs import keep, kept
 from surehold.campaigns.methods import Surehold
 from surehold.campaigns.peers import installed_peers
 from surehold.optimization.surrogates.named import DEFAULT_SURROGATE, surrogate_named
@@ -130,18 +130,13 @@ def run(name, method, seed):
 
 def _kept(name, method, seeds, file, processes):
     """Return what the run of each seed found, those of a file included."""
-    known = {}
-    if file is not None and file.exists():
-        rows = map(json.loads, file.read_text(encoding="utf-8").splitlines())
-        known = {seed: found for f, m, seed, *found in rows if (f, m) == (name, method)}
-    missing = [seed for seed in seeds if seed not in known]
-    runs = Parallel(n_jobs=processes, return_as="generator")(delayed(run)(name, method, seed) for seed in missing)
-    for seed, found in zip(missing, runs, strict=True):
-        known[seed] = [float(number) for number in found]
-        if file is not None:
-            with file.open("a", encoding="utf-8") as kept:
-                print(json.dumps([name, method, seed, *known[seed]]), file=kept)
-    return [known[seed] for seed in seeds]
+    known = kept(file)
+    missing = [asked for seed in seeds if (asked := (name, method, seed)) not in known]
+    runs = Parallel(n_jobs=processes, return_as="generator")(delayed(run)(*asked) for asked in missing)
+    for asked, found in zip(missing, runs, strict=True):
+        known[asked] = [float(number) for number in found]
+        keep(file, asked, known[asked])
+    return [known[name, method, seed] for seed in seeds]
 
 
 def main():

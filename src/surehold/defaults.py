@@ -259,8 +259,8 @@ VARYING_NOISE_CONVERGED: Final = 0.02
 VARYING_NOISE_LONGEST_STEP: Final = 2.0
 #: Rounds of learning where trials stray under the input noise: slopes, and from the third round on what averaging takes
 #: off, are those of the round before. Two bend after the noise where surrogate="gp"; with three, four, five the stated
-#: mean is .017 (.005), .002 (.004) and .009 (.004) too low on 90 functions each in one and two variables, where
-#: CURVATURE_WEIGHT is 2: python -m benchmarks.calibration --rows straying --first-seed 10000 --dimensions 1 2.
+#: mean is .017 (.005), .002 (.004) and .009 (.004) too low where CURVATURE_WEIGHT is 2: python -m
+#: benchmarks.calibration --rows straying --first-seed 10000 --runs 90 --dimensions 1 2.
 SLOPE_ROUNDS: Final = 4
 #: Of a mean a z + b z^2 along the input noise z, the noise of a trial that strays counts as a^2 and so many b^2. Its
 #: variance has 2, by which the stated mean is too low where noise is wide (straying .1); with 0, which it was, the

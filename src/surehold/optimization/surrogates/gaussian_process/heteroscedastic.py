@@ -79,9 +79,9 @@ def with_learnt_noise(common: Evidence) -> tuple[Evidence, GaussianProcessPoster
         s = (y - f.mean[0]) ** 2 + f.variance[0]
         level = g.mean()
         working = g - level + np.minimum(s * np.exp(-g) - 1.0, VARYING_NOISE_LONGEST_STEP)
-        if steps == 0 and not _varies(levels._replace(y=working)):
-            return common, None
         posterior = _at_mode(levels._replace(y=working), Standardization(level, 1.0, False))
+        if steps == 0 and not _varies(posterior):
+            return common, None
         change = posterior.moments(X).mean[0] - g
         g = g + change
         steps += 1
@@ -97,9 +97,10 @@ def log_evidence_of_a_constant(working: NDArray[np.float64]) -> float:
     return -0.5 * (squares + (n - 1) * log(_WORKING_VARIANCE) + log(along) + n * log(2.0 * pi))
 
 
-def _varies(levels: Evidence) -> bool:
-    """Return whether working observations are likelier if g varies; NaN is no."""
-    return log_evidence_and_root(levels, mode(levels)[0])[0] > log_evidence_of_a_constant(levels.y)
+def _varies(levels: GaussianProcessPosterior) -> bool:
+    """Return whether working observations, of which the mode is known, are likelier if g varies; NaN is no."""
+    log_evidence, _ = log_evidence_and_root(levels.evidence, levels.hyperparameters.theta[0])
+    return log_evidence > log_evidence_of_a_constant(levels.evidence.y)
 
 
 def _at_mode(evidence: Evidence, outputs: Standardization = _PLAIN) -> GaussianProcessPosterior:
