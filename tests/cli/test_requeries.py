@@ -59,3 +59,29 @@ def test_ctrl_c_leaves_the_rest_out(hill):
     scores, notes, _ = scored(hill, 7)
     assert [score is None for score in scores.values()] == [False, True]
     assert notes == ["The re-queries of the recommended point were interrupted and left out."]
+
+
+@pytest.mark.parametrize("border", ["keep", "extend"])
+def test_re_queries_that_would_have_left_the_box_are_counted(border):
+    class Slope(Hill):
+        def __init__(self):
+            super().__init__()
+            self.border = border
+
+        def __call__(self, x):
+            return float(x[0])
+
+    problem = Slope()
+    result = sh.maximize(problem, problem.box, n_trials=8, initial_points=[[0.2], [1.0]], input_noise=NOISE, seed=0)
+    scores, notes, _ = scored((problem, result), 50)
+    extended = sh.problems.perturbed_points(result.X[1], problem.box, NOISE, 50, 0, "extend")
+    left = int((extended > 1.0).sum())
+    assert left > 10
+    if border == "keep":
+        assert notes == [
+            "Re-queries stay in the box: a variable that would have left it kept its commanded value "
+            f"(in {left} of 50 of the recommended point)."
+        ]
+        assert int((scores["recommended", 1].points == 1.0).sum()) == left
+    else:
+        assert notes == []

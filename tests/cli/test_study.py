@@ -79,6 +79,16 @@ def test_a_robot_by_commands(study, here):
     assert len(lines) == 10
 
 
+def test_executions_that_leave_the_ranges_are_named(study, capsys):
+    study("create rig --parameters x=0:1 --noise x=0.05 --initial 4")
+    for k in range(6):
+        x = study("ask rig")["parameters"]["x"]
+        study(f"tell rig {k} {x!r}")
+    assert study("recommend rig")["outside"]["x"] > 0.2
+    assert run(["study", "recommend", "rig"]) == 0
+    assert "% along x of its executions" in capsys.readouterr().out
+
+
 def test_stop_says_when_asking_ends(study, capsys):
     study(CREATE)
     for options, words in (

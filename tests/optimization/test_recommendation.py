@@ -8,7 +8,7 @@ from scipy import stats
 
 import surehold as sh
 from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.recommendation import expectation_at, in_digits
+from surehold.optimization.recommendation import expectation_at, in_digits, outside_in_words
 
 LINE = sh.Box({"x": (-1.0, 1.0)})
 
@@ -48,6 +48,30 @@ def test_under_input_noise_one_execution_strays_and_the_mean_does_not():
     assert best.std == pytest.approx(values.std(), rel=0.05)
     assert best.expectation.mean == pytest.approx(best.mean, abs=1e-6)
     assert best.expectation.std < 0.1 * best.std
+
+
+@pytest.mark.parametrize("border", ["extend", "clip", "keep"])
+@pytest.mark.parametrize("top", [1.0, 0.8, 0.0])
+def test_it_is_stated_how_many_executions_leave_the_box(border, top):
+    noise = sh.InputNoise({"x": 0.2, "y": 0.01})
+    box = sh.Box({"x": (-1.0, 1.0), "y": (0.0, 1.0)})
+    optimizer = sh.Optimizer(box, input_noise=noise, border=border, seed=0)
+    X = np.array([(x, y) for x in np.linspace(-1.0, 1.0, 6) for y in (0.2, 0.5, 0.8)] + [(top, 0.5)])
+    optimizer.restore(X, -((X[:, 0] - top) ** 2) - (X[:, 1] - 0.5) ** 2)
+    best = optimizer.recommend()
+    share = stats.norm.sf(1.0, best.x[0], 0.2) + stats.norm.cdf(-1.0, best.x[0], 0.2)
+    if border != "extend" or share < 0.01:
+        assert best.outside == {}
+    else:
+        assert best.outside == {"x": pytest.approx(share, abs=0.02)}
+    assert bool(outside_in_words(best.outside)) == (best.outside.get("x", 0.0) > 0.2)
+
+
+def test_only_variables_along_which_many_leave_the_box_are_named():
+    assert outside_in_words({}) == outside_in_words({"dx": 0.15}) == ""
+    said = outside_in_words({"dx": 0.15, "dy": 0.4837, "dz": 0.25})
+    assert "48% along dy, 25% along dz" in said
+    assert "dx" not in said
 
 
 def test_straying_trials_do_not_count_the_input_noise_twice():

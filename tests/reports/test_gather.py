@@ -155,6 +155,15 @@ def test_outliers_are_named_in_the_notes():
     assert f" {', '.join(map(str, bad))} gave" in report.notes[0]
 
 
+def test_an_answer_whose_executions_leave_the_box_is_said_to_be_one():
+    box, noise = sh.Box({"x": (0.0, 1.0)}), sh.InputNoise({"x": 0.05})
+    result = sh.maximize(lambda x: float(x[0]), box, 10, n_initial=4, input_noise=noise, seed=0)
+    assert result.recommendation.outside["x"] > 0.2
+    report = result_report(result)
+    assert [note for note in report.notes if "along x" in note]
+    assert "along x" in result._repr_html_()
+
+
 @pytest.mark.parametrize("direction", ["maximize", "minimize"])
 def test_a_better_trial_that_breaks_a_limit_is_named(direction):
     sign = 1.0 if direction == "maximize" else -1.0

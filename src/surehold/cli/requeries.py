@@ -7,12 +7,13 @@ from rich.console import Console
 
 from surehold.optimization.maximization import Result
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.problems.perturbation import RobustScore, robust_score
+from surehold.problems.perturbation import RobustScore, perturbed_points, robust_score
 from surehold.problems.problem import Problem
 
 __all__ = ["requeried"]
 
 _SOON = 2.0  # seconds of silence
+_MANY = 0.2  # share of re-queries that would have left the box
 
 
 def requeried(
@@ -47,4 +48,27 @@ def requeried(
             scores[label, index] = robust_score(problem, result.X[index], noise, n, seed, told)
         except KeyboardInterrupt:
             return scores, [f"The re-queries of the {label} point were interrupted and left out."]
-    return scores, []
+    return scores, _held(problem, result, noise, n, seed, answers)
+
+
+def _held(
+    problem: Problem,
+    result: Result,
+    noise: InputNoise,
+    n: int,
+    seed: int,
+    answers: Collection[tuple[str, int]],
+) -> list[str]:
+    """Return in words how many re-queries would have left the box, where they are not allowed to and many would."""
+    if getattr(problem, "border", "keep") == "extend":
+        return []
+    left = {
+        label: sum(
+            not problem.box.contains(point)
+            for point in perturbed_points(result.X[index], problem.box, noise, n, seed, "extend")
+        )
+        for label, index in answers
+    }
+    parts = [f"{count} of {n} of the {label} point" for label, count in left.items() if count >= _MANY * n]
+    held = "a variable that would have left it kept its commanded value"
+    return [f"Re-queries stay in the box: {held} (in {', '.join(parts)})."] if parts else []

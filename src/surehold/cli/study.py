@@ -188,7 +188,7 @@ def tell(
 
 def recommend(name: Name, storage: Storage = "", as_json: Json = False) -> None:
     """Recommend the trial that still holds when the input is off, and note it in the study."""
-    from surehold.optimization.recommendation import outliers_in_words
+    from surehold.optimization.recommendation import outliers_in_words, outside_in_words
 
     study = opened(name, storage)
     best = study.recommend()
@@ -197,7 +197,14 @@ def recommend(name: Name, storage: Storage = "", as_json: Json = False) -> None:
     lines += [f"  {key} = {value} {units.get(key, '')}".rstrip() for key, value in best.parameters.items()]
     lines += [f"  expected {key} {value:.4g}" for key, value in best.outputs.items()]
     lines += [f"{best.feasible:.1%} of executions keep all constraints"] if study.sampler.outputs else []
-    lines += [text for text in (best.infeasible, best.refused, outliers_in_words(best.outliers), best.warning) if text]
+    said = (
+        best.infeasible,
+        best.refused,
+        outside_in_words(best.outside),
+        outliers_in_words(best.outliers),
+        best.warning,
+    )
+    lines += filter(None, said)
     say(best.as_dict() | {"units": dict(units)}, "\n".join(lines), as_json)
 
 

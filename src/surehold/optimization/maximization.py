@@ -17,7 +17,7 @@ from surehold.optimization.evaluation import Evaluation, in_processes, one_by_on
 from surehold.optimization.limits import returned_outputs
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.progress import progress_bar
-from surehold.optimization.recommendation import Recommendation, in_digits, place
+from surehold.optimization.recommendation import Recommendation, in_digits, outside_in_words, place
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -170,7 +170,7 @@ class Result:
         if best.by_risk is not None:
             rows.insert(-3, (f"{self.optimizer.risk}", in_digits(best.by_risk, best.std, 6)))
         cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
-        said = (best.refused, best.warning)
+        said = (best.refused, outside_in_words(best.outside), best.warning)
         refused = "".join(f"<p>{escape(text)}</p>" for text in said if text)
         return f"<table><caption>Recommended after {amount(len(self.y), 'trial')}</caption>{cells}</table>{refused}"
 

@@ -29,6 +29,7 @@ __all__ = [
     "expectation_at",
     "in_digits",
     "outliers_in_words",
+    "outside_in_words",
     "place",
     "recommendation",
 ]
@@ -36,6 +37,8 @@ __all__ = [
 _LEVEL: Final = 0.05
 #: Why a trial that reached such a place is no answer.
 OUTSIDE: Final = "reached a place outside of the box."
+_SOME_OUTSIDE: Final = 0.01  # share of executions
+_MANY_OUTSIDE: Final = 0.2
 
 
 @dataclass(frozen=True)
@@ -128,6 +131,9 @@ class Recommendation:
         {name: Outcome} of the further outputs of one execution.
     by_risk
         What x is expected to be worth by the risk measure that was asked for; None where that is the mean.
+    outside : dict
+        {name: share of executions that leave the box along this variable}, of shares from 0.01 on. Nothing can be tried
+        there: what is expected of these executions rests on the model alone. Empty with `border="clip"` or "keep".
     """
 
     x: NDArray[np.float64]
@@ -147,6 +153,7 @@ class Recommendation:
     infeasible: str = ""
     outputs: Mapping[str, Outcome] = field(default_factory=dict)
     by_risk: float | None = None
+    outside: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         mean, quantile = (in_digits(value, self.std, 6) for value in (self.mean, self.quantile))
@@ -183,6 +190,19 @@ def outliers_in_words(numbers: Sequence[int]) -> str:
         f"{'Trials' if several else 'Trial'} {', '.join(map(str, numbers))} gave {'values' if several else 'a value'} "
         f"so far on the bad side of all others that {'they count' if several else 'it counts'} as the worst of those. "
         "Nothing is to be done if that is how the place is; a trial that gave no measurement is better told as failed."
+    )
+
+
+def outside_in_words(outside: Mapping[str, float]) -> str:
+    """Return what a user should know of `Recommendation.outside`; empty where few executions leave the box."""
+    many = [f"{share:.0%} along {name}" for name, share in outside.items() if share >= _MANY_OUTSIDE]
+    if not many:
+        return ""
+    return (
+        f"The recommended input is near the border of the box: {', '.join(many)} of its executions leave it. Nothing "
+        "was tried there, and the model goes on as inside: behind a cliff they would be worth less. Execute it a few "
+        "times before you rely on it, or widen the box if trials can be made there; where executions stop at the "
+        'border, the optimizer should know: border="clip".'
     )
 
 
@@ -299,7 +319,15 @@ def recommendation(
         Outcome(sign * expectation.means, expectation.stds),
         box.as_dict(x),
         by_risk=None if by_risk is None else sign * by_risk[1],
+        outside=_outside(reached, u, box),
     )
+
+
+def _outside(reached: Perturbations, u: NDArray[np.float64], box: Box) -> dict[str, float]:
+    """Return the share of executions at u (d,) that leave the box, by variable."""
+    beyond = np.abs(reached.around(u[None, :])[0] - 0.5) > 0.5 + 1e-9  # (s, d)
+    shares = zip(box.names, reached.quadrature.weights @ beyond, strict=True)
+    return {name: float(share) for name, share in shares if share >= _SOME_OUTSIDE}
 
 
 def place(x: NDArray[np.float64], parameters: Mapping[str, Any]) -> str:

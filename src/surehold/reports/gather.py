@@ -11,7 +11,7 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.maximization import Result
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.recommendation import outliers_in_words
+from surehold.optimization.recommendation import outliers_in_words, outside_in_words
 from surehold.optimization.variables import Number
 from surehold.problems.perturbation import RobustScore
 from surehold.reports.run_report import (
@@ -227,7 +227,13 @@ def report_of(
             *notes,
             *missing,
             *_of_constraints(result),
-            *filter(None, [outliers_in_words([called[i] for i in result.recommendation.outliers])]),
+            *filter(
+                None,
+                (
+                    outside_in_words(result.recommendation.outside),
+                    outliers_in_words([called[i] for i in result.recommendation.outliers]),
+                ),
+            ),
         ),
         choices=choices or {},
         minimized=minimized,

@@ -11,7 +11,7 @@ import numpy as np
 from optuna.study import Study
 
 from surehold.errors import InputError
-from surehold.optimization.recommendation import in_digits, outliers_in_words
+from surehold.optimization.recommendation import in_digits, outliers_in_words, outside_in_words
 from surehold.studies.dashboard_note import read_note, write_note
 from surehold.studies.history import REACHED
 from surehold.studies.sampler import Sampler, direction_of
@@ -63,6 +63,8 @@ class StudyRecommendation:
     """what they are expected to be worth by the risk measure that was asked for; None where that is the mean"""
     risk: str = "mean"
     """that measure, in words"""
+    outside: dict[str, float] = field(default_factory=dict)
+    """share of executions that leave the ranges, where nothing can be tried, by parameter"""
 
     @property
     def expected(self) -> str:
@@ -157,6 +159,7 @@ def find_recommendation(study: Study, sampler: Sampler | None = None) -> StudyRe
         {f"{share:g}": best.probability_of_share(share) for share in _SHARES} if success else {},
         best.by_risk,
         risk.words(direction == "minimize"),
+        dict(best.outside),
     )
 
 
@@ -179,10 +182,8 @@ def note_of(found: StudyRecommendation, name: str, units: Mapping[str, str]) -> 
         lines += ["", found.infeasible[:1].upper() + found.infeasible[1:]]
     if found.refused:
         lines += ["", f"Not trial {found.best_trial}, the best observed one. {found.refused}"]
-    if found.outliers:
-        lines += ["", outliers_in_words(found.outliers)]
-    if found.warning:
-        lines += ["", found.warning]
+    for more in (outside_in_words(found.outside), outliers_in_words(found.outliers), found.warning):
+        lines += ["", more] if more else []
     return "\n".join([*lines, "", _END])
 
 
