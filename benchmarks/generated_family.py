@@ -2,14 +2,17 @@
 
     python -m benchmarks.generated_family --count 60 --methods default tgp plain --classes ridges anisotropic
     python -m benchmarks.generated_family --set test --count 200 --out family.csv
+    python -m benchmarks.generated_family --set kinds --first 336 --count 140 --methods default plain
 
 One to eight variables; hills, needles, cliffs, ridges; isotropic, anisotropic (some inputs exact), correlated, uniform
 and varying noise: see `benchmarks.generated_landscapes`. Constants are chosen on the training set only; the test set
-is for the one judgment at the end. Every method gets the same initial design, problem by problem. Regret is what the
-answer's outcome under the noise lacks to the best one, in per cent of the best minus the mean over the box; within 1 %
-counts as found. Printed are, at half and full budget, the share found and the mean regret with standard errors over
-problems, the paired difference of the final regret from the first method, and CPU seconds a run; for all problems, and
-by shape, noise and number of variables.
+is for the one judgment at the end. The set `kinds` has other functions, see `benchmarks.fourteen_kinds`. Every method
+gets the same initial design, problem by problem. Regret is what the answer's outcome under the noise lacks to the best
+one, in per cent of the best minus the mean over the box; within 1 % counts as found. Printed are, at half and full
+budget, the share found and the mean regret with standard errors over problems, the paired difference of the final
+regret from the first method, and CPU seconds a run; for all problems, and by shape, noise and number of variables. Of
+methods that state a mean it is printed how many of its 95 % intervals hold, also of answers so near the border that at
+least 30 % of their executions leave the box.
 """
 
 import argparse
@@ -24,6 +27,7 @@ from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 import surehold as sh
+from benchmarks.fourteen_kinds import KINDS, of_kind
 from benchmarks.generated_landscapes import BUDGETS, NOISES, SHAPES, TEST, TRAINING, landscape
 from surehold.campaigns.methods import perturbations_of
 from surehold.campaigns.peers import installed_peers
@@ -37,22 +41,34 @@ OURS = {
     "gp": {"surrogate": "gp"},
 }
 TOLD = {"botorch-robust": "botorch"}  # peers told of the input noise
+#: set -> (what draws a problem, its seeds)
+SETS = {"training": (landscape, TRAINING), "test": (landscape, TEST), "kinds": (of_kind, range(10_000))}
+LEAVING = 0.3  # share of executions
 GROUPS = {"1-2 variables": (1, 2), "3-4 variables": (3, 4), "5-6 variables": (5, 6), "7-8 variables": (7, 8)}
 
 
-def run(seed, run_seed, method, budget_share=1.0):
-    """Return a row: the problem's kind, and regrets [%] at half and full budget."""
-    problem = landscape(seed)
+def run(seed, run_seed, method, budget_share=1.0, of="training"):
+    """Return a row: the problem's kind, regrets [%] at half and full budget, and how what is stated holds.
+
+    `holds` says whether the 95 % interval of the mean does, `leaving` how many executions leave the box along one
+    variable; both are empty for a method that states none. `of` names a set that has the seed.
+    """
+    problem = SETS[of][0](seed)
     d = problem.dimension
     budget = max(int(budget_share * BUDGETS[d]), 10)
     n_initial = min(sh.Optimizer.default_n_initial(problem.box), budget // 2)
     initial = qmc.LatinHypercube(d, rng=np.random.default_rng([seed, run_seed, 98])).random(n_initial)
     started = time.process_time()
     with threadpool_limits(1):
-        answers = _answers(problem, method, initial, budget, run_seed)
+        answers, stated = _answers(problem, method, initial, budget, run_seed)
     seconds = time.process_time() - started
     best = problem.best()
-    half, full = 100.0 * (best.value - problem.expectation(np.array(answers))) / best.scale
+    outcomes = problem.expectation(np.array(answers))
+    half, full = 100.0 * (best.value - outcomes) / best.scale
+    holds = leaving = ""
+    if stated is not None:
+        low, high = (stated.expectation.quantile(level) for level in (0.025, 0.975))
+        holds, leaving = int(low <= outcomes[1] <= high), max(stated.outside.values(), default=0.0)
     return {
         "seed": seed,
         "run": run_seed,
@@ -63,11 +79,13 @@ def run(seed, run_seed, method, budget_share=1.0):
         "half": float(half),
         "full": float(full),
         "seconds": seconds,
+        "holds": holds,
+        "leaving": leaving,
     }
 
 
 def _answers(problem, method, initial, budget, seed):
-    """Return the answers after half and all of the trials."""
+    """Return the answers after half and all of the trials, and the last recommendation, None where there is none."""
     waiting, answers, X, y = list(initial), [], [], []
     if method in OURS:
         settings = OURS[method]
@@ -88,7 +106,8 @@ def _answers(problem, method, initial, budget, seed):
         optimizer.tell(u, y[-1])
         if i + 1 in (budget // 2, budget):
             answers.append(answer())
-    return answers
+    states = method in OURS and OURS[method] is not None
+    return answers, optimizer.recommend() if states else None
 
 
 def _everywhere(problem):
@@ -119,7 +138,7 @@ def summary(rows, reference=None):
 def classes_of(rows):
     """Return {class: rows}, all first."""
     found = {"all": rows}
-    found |= {shape: [row for row in rows if row["shape"] == shape] for shape in SHAPES}
+    found |= {shape: [row for row in rows if row["shape"] == shape] for shape in (*SHAPES, *KINDS)}
     found |= {noise: [row for row in rows if row["noise"] == noise] for noise in NOISES}
     found |= {name: [row for row in rows if row["d"] in group] for name, group in GROUPS.items()}
     return {name: members for name, members in found.items() if members}
@@ -142,21 +161,26 @@ def chosen_seeds(family, first, count, classes):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--set", choices=("training", "test"), default="training")
+    parser.add_argument("--set", choices=tuple(SETS), default="training")
     parser.add_argument("--first", type=int, default=0, help="number of the first problem in the set")
     parser.add_argument("--count", type=int, default=20, help="problems")
     parser.add_argument("--runs", type=int, default=1, help="runs a problem")
-    parser.add_argument("--classes", nargs="+", default=[], choices=(*SHAPES, *NOISES, *GROUPS))
+    parser.add_argument(
+        "--classes", nargs="+", default=[], choices=(*SHAPES, *NOISES, *GROUPS), help="of training and test"
+    )
     parser.add_argument("--methods", nargs="+", default=list(OURS), choices=(*OURS, *installed_peers(), *TOLD))
     parser.add_argument("--budget", type=float, default=1.0, help="share of the usual number of trials")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", default="", help="file for the rows, as CSV")
     arguments = parser.parse_args()
-    family = {"training": TRAINING, "test": TEST}[arguments.set]
-    seeds = chosen_seeds(family, arguments.first, arguments.count, arguments.classes)
+    family = SETS[arguments.set][1]
+    if arguments.set == "kinds":
+        seeds = list(family[arguments.first : arguments.first + arguments.count])
+    else:
+        seeds = chosen_seeds(family, arguments.first, arguments.count, arguments.classes)
     tasks = [(s, r, m) for s in seeds for r in range(arguments.runs) for m in arguments.methods]
     rows = []
-    jobs = (delayed(run)(*task, arguments.budget) for task in tasks)
+    jobs = (delayed(run)(*task, arguments.budget, arguments.set) for task in tasks)
     try:
         for row in Parallel(n_jobs=arguments.processes, return_as="generator")(jobs):
             rows.append(row)
@@ -187,6 +211,17 @@ def main():
             comparable = method != arguments.methods[0] and own and all(same)
             if own:
                 print(f"{name:14} {method:14} {summary(own, same if comparable else None)}")
+    for method in arguments.methods:
+        stated = [row for row in rows if row["method"] == method and row["holds"] != ""]
+        if stated:
+            print(f"{method}: 95 % intervals of the mean that hold: {_held(stated)}")
+
+
+def _held(rows):
+    """Return in words how many intervals hold, and of answers near the border."""
+    near = [row for row in rows if row["leaving"] >= LEAVING]
+    parts = [f"{sum(row['holds'] for row in members)} of {len(members)}" for members in (rows, near)]
+    return f"{parts[0]}; where {LEAVING:.0%} of the executions and more leave the box, {parts[1]}"
 
 
 if __name__ == "__main__":
