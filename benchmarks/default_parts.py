@@ -17,9 +17,9 @@
 Of each problem a run of the default, and one without the part that is named: the model `smooth`, a squared-exponential
 process, or `sums` of processes of one variable, whose particles it then lacks, the `odds` against the smooth model, the
 `least` length-scale of it, or in the search the `exchange` of single variables, or the trials that `polish` while it is
-stalled; with the same initial design. Printed are means with standard errors, the paired difference and, of regrets in per cent, runs within 1 %, the difference of
-the logarithm (base 10; regrets below 0.01 % count as that), and how many runs come within 1 % with the part that do not
-without it, and the other way round.
+stalled; with the same initial design. Printed are means with standard errors, the paired difference and, of regrets in
+per cent, runs within 1 %, the difference of the logarithm (base 10; regrets below 0.01 % count as that), and how many
+runs come within 1 % with the part that do not without it, and the other way round.
 """
 
 import argparse
