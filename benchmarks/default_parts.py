@@ -16,10 +16,10 @@
 
 Of each problem a run of the default, and one without the part that is named: the model `smooth`, a squared-exponential
 process, or `sums` of processes of one variable, whose particles it then lacks, the `odds` against the smooth model, the
-`least` length-scale of it, or in the search the `exchange` of single variables, or the trials that `polish` while it is
-stalled; with the same initial design. Printed are means with standard errors, the paired difference and, of regrets in
-per cent, runs within 1 %, the difference of the logarithm (base 10; regrets below 0.01 % count as that), and how many
-runs come within 1 % with the part that do not without it, and the other way round.
+`least` length-scale of it, or in the search the `exchange` of single variables; with the same initial design. Printed
+are means with standard errors, the paired difference and, of regrets in per cent, runs within 1 %, the difference of
+the logarithm (base 10; regrets below 0.01 % count as that), and how many runs come within 1 % with the part that do not
+without it, and the other way round.
 """
 
 import argparse
@@ -42,7 +42,6 @@ from benchmarks.kept_runs import keep, kept
 from benchmarks.search_variants import begun, regret
 from benchmarks.separable_functions import separable
 from surehold.optimization.maximizer import multistart
-from surehold.optimization.strategy import expected_improvement
 from surehold.optimization.surrogates.gaussian_process import hyperparameters
 from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
 
@@ -94,7 +93,6 @@ def searching(variant, part):
         "odds": mock.patch.object(hyperparameters, "SMOOTH_ODDS", 0.0),
         "least": mock.patch.object(hyperparameters, "SMOOTH_LEAST", 1e-300),
         "exchange": mock.patch.object(multistart, "FEW_VARIABLES", np.inf),
-        "polish": mock.patch.object(expected_improvement, "POLISH_BESIDES", np.inf),
     }
     with absent[part] if variant == "without" else nullcontext():
         yield
@@ -164,7 +162,7 @@ def ask_seconds(function, n, d, noise, seed):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("subject", choices=list(SEEDS))
-    parts = ("smooth", "sums", "odds", "least", "exchange", "polish")
+    parts = ("smooth", "sums", "odds", "least", "exchange")
     parser.add_argument("--without", choices=parts, default="sums", help="what the one run lacks")
     parser.add_argument("--first", type=int, help="first seed, or its number in the set")
     parser.add_argument("--count", type=int, help="seeds")

@@ -58,11 +58,6 @@ MARGIN_UNDER_NOISE: Final = 1e-2
 #: Every third trial counts any improvement, so that a smooth top is still found to many digits. It is due on the same
 #: trials as COVERING_PERIOD: while the search is stalled those trials cover, and none polishes. Never measured.
 POLISH_PERIOD: Final = 3
-#: Under input noise one of so many trials counts any improvement besides, while the search is stalled, too: without it
-#: what is left at the top that is known falls below the margin, and all trials go elsewhere, where the model expects
-#: nothing. Of 336 runs on fourteen kinds of functions 76 % end within 1 % in place of 73, of 271 with 3 in place
-#: of 6 77 % in place of 71: python -m benchmarks.default_parts kinds --without polish.
-POLISH_BESIDES: Final = 6
 
 # --- insurance against a model that is too smooth ---------------------------------------------------------------------
 

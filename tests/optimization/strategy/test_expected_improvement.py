@@ -74,22 +74,6 @@ def test_every_third_trial_counts_any_improvement():
         assert u == pytest.approx(top, abs=5e-4), f"{15 + failed} trials"
 
 
-def test_under_input_noise_one_of_six_counts_any_improvement_besides():
-    """It is due while the search is stalled, too, when those of every third trial cover."""
-    dense = np.linspace(0.0, 1.0, 15)[:, None]
-    hill = -((dense[:, 0] - 0.22) ** 2)
-    sure = GaussianProcess(length_scales=[0.5], signal_variance=0.01, standardize=False).fit(dense, hill).posterior
-    found = {}
-    for told in range(15, 22):
-        history = History(dense, hill, np.full((told - 15, 1), 0.99), NONE)
-        beside_and_candidates = strategy_of("robust_log_ei").candidates(sure, history, np.random.default_rng(0))
-        found[told] = beside_and_candidates[5, 0]
-    polished, others = ([found[told] for told in numbers] for numbers in ((15, 18, 19, 21), (16, 17, 20)))
-    np.testing.assert_allclose(polished, polished[0], atol=1e-6)
-    np.testing.assert_allclose(others, others[0], atol=1e-6)
-    assert abs(polished[0] - others[0]) > 2e-3
-
-
 def test_a_robust_candidate_may_be_tried_beside_itself(posterior):
     found = strategy_of("robust_ei").candidates(posterior, HISTORY, np.random.default_rng(0))
     unscented = strategy_of("uei").candidates(posterior, HISTORY, np.random.default_rng(0))

@@ -20,8 +20,8 @@ class Covering:
     """Another strategy, except that every third trial fills the largest hole while the search is stalled.
 
     It is stalled where none of the last three trials is the best one: a model that is too smooth can be sure that
-    nothing is left to find. Trials that polish (`defaults.POLISH_PERIOD`) are due on the same numbers, so that while it
-    is stalled there are only those besides (`defaults.POLISH_BESIDES`), under input noise.
+    nothing is left to find. Trials that polish (`defaults.POLISH_PERIOD`) are due on the same numbers, so that there is
+    none of them while the search is stalled.
     """
 
     strategy: Strategy

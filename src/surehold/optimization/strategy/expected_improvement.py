@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import MARGIN, MARGIN_UNDER_NOISE, POLISH_BESIDES, POLISH_PERIOD, SCREENING_DIVISOR
+from surehold.defaults import MARGIN, MARGIN_UNDER_NOISE, POLISH_PERIOD, SCREENING_DIVISOR
 from surehold.optimization.acquisition.scales import Acquisition, CriterionName
 from surehold.optimization.acquisition.where_to_look import where_to_look
 from surehold.optimization.maximizer.multistart import multistart
@@ -73,8 +73,7 @@ class ExpectedImprovement:
 
     def _margin(self, history: History) -> float:
         """Return the improvement that does not count, in the outputs' units."""
-        exact = self.criterion.scale == "exact"
-        polish = history.told % POLISH_PERIOD == 0 or (not exact and history.told % POLISH_BESIDES == 1)
-        if self.ranking.noisy or (polish and not len(history.pending)):
+        polish = history.told % POLISH_PERIOD == 0 and not len(history.pending)
+        if self.ranking.noisy or polish:
             return 0.0
-        return (MARGIN if exact else MARGIN_UNDER_NOISE) * history.spread
+        return (MARGIN if self.criterion.scale == "exact" else MARGIN_UNDER_NOISE) * history.spread
