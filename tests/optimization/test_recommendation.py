@@ -70,7 +70,7 @@ def test_it_is_stated_how_many_executions_leave_the_box(border, top):
 def test_only_variables_along_which_many_leave_the_box_are_named():
     assert outside_in_words({}) == outside_in_words({"dx": 0.15}) == ""
     said = outside_in_words({"dx": 0.15, "dy": 0.4837, "dz": 0.25})
-    assert "48% along dy, 25% along dz" in said
+    assert "of 100 executions 48 along dy, 25 along dz leave it" in said
     assert "dx" not in said
 
 

@@ -1,19 +1,20 @@
 """The perturbed re-queries of a run's points: announced where they take long, left out at Ctrl-C."""
 
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
+import numpy as np
 from rich.console import Console
 
 from surehold.optimization.maximization import Result
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.problems.perturbation import RobustScore, perturbed_points, robust_score
+from surehold.optimization.recommendation import MANY_OUTSIDE
+from surehold.problems.perturbation import RobustScore, robust_score
 from surehold.problems.problem import Problem
 
 __all__ = ["requeried"]
 
 _SOON = 2.0  # seconds of silence
-_MANY = 0.2  # share of re-queries that would have left the box
 
 
 def requeried(
@@ -48,27 +49,19 @@ def requeried(
             scores[label, index] = robust_score(problem, result.X[index], noise, n, seed, told)
         except KeyboardInterrupt:
             return scores, [f"The re-queries of the {label} point were interrupted and left out."]
-    return scores, _held(problem, result, noise, n, seed, answers)
+    return scores, _held(scores, result)
 
 
-def _held(
-    problem: Problem,
-    result: Result,
-    noise: InputNoise,
-    n: int,
-    seed: int,
-    answers: Collection[tuple[str, int]],
-) -> list[str]:
-    """Return in words how many re-queries would have left the box, where they are not allowed to and many would."""
-    if getattr(problem, "border", "keep") == "extend":
-        return []
-    left = {
-        label: sum(
-            not problem.box.contains(point)
-            for point in perturbed_points(result.X[index], problem.box, noise, n, seed, "extend")
-        )
-        for label, index in answers
-    }
-    parts = [f"{count} of {n} of the {label} point" for label, count in left.items() if count >= _MANY * n]
-    held = "a variable that would have left it kept its commanded value"
-    return [f"Re-queries stay in the box: {held} (in {', '.join(parts)})."] if parts else []
+def _held(scores: Mapping[tuple[str, int], RobustScore | None], result: Result) -> list[str]:
+    """Return in words how many re-queries would have left the box, where many would and were kept in it."""
+    nobody, parts = result.optimizer.box.uncontrolled, []
+    for (label, index), score in scores.items():
+        if score is not None:
+            held = (score.points == result.X[index]) & (np.ptp(score.points, axis=0) > 0.0)
+            if nobody is not None:
+                held &= ~nobody.held
+            count, n = int(np.any(held, axis=1).sum()), len(score.points)
+            if count >= MANY_OUTSIDE * n:
+                parts.append(f"{count} of {n} of the {label} point")
+    kept = "a variable that would have left it kept its commanded value"
+    return [f"Re-queries stay in the box: {kept} (in {', '.join(parts)})."] if parts else []

@@ -22,6 +22,7 @@ from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.surrogates.protocol import Posterior, means
 
 __all__ = [
+    "MANY_OUTSIDE",
     "OUTSIDE",
     "Outcome",
     "Recommendation",
@@ -37,8 +38,9 @@ __all__ = [
 _LEVEL: Final = 0.05
 #: Why a trial that reached such a place is no answer.
 OUTSIDE: Final = "reached a place outside of the box."
-_SOME_OUTSIDE: Final = 0.01  # share of executions
-_MANY_OUTSIDE: Final = 0.2
+#: Share of executions from which it is worth a sentence that they leave the box.
+MANY_OUTSIDE: Final = 0.2
+_SOME_OUTSIDE: Final = 0.01
 
 
 @dataclass(frozen=True)
@@ -195,11 +197,11 @@ def outliers_in_words(numbers: Sequence[int]) -> str:
 
 def outside_in_words(outside: Mapping[str, float]) -> str:
     """Return what a user should know of `Recommendation.outside`; empty where few executions leave the box."""
-    many = [f"{share:.0%} along {name}" for name, share in outside.items() if share >= _MANY_OUTSIDE]
+    many = [f"{100.0 * share:.0f} along {name}" for name, share in outside.items() if share >= MANY_OUTSIDE]
     if not many:
         return ""
     return (
-        f"The recommended input is near the border of the box: {', '.join(many)} of its executions leave it. Nothing "
+        f"The recommended input is near the border of the box: of 100 executions {', '.join(many)} leave it. Nothing "
         "was tried there, and the model goes on as inside: behind a cliff they would be worth less. Execute it a few "
         "times before you rely on it, or widen the box if trials can be made there; where executions stop at the "
         'border, the optimizer should know: border="clip".'
