@@ -3,7 +3,6 @@
     landscapes  training seeds of `benchmarks.generated_landscapes`, one to eight variables, all kinds of noise; final
                 regret [%] of all, by number of variables and by shape. `--rows FILE` keeps the runs, and those that it
                 holds are not made again; with `--count 0` all of them are printed
-    kinds       seeds of `benchmarks.fourteen_kinds`, one to eight variables; final regret [%], `--rows` likewise
     separable   seeds of `benchmarks.separable_functions`, four to eight variables, with noise or none; regret [%] at
                 half and full budget, `--rows` likewise. `--variables 2 3` draws functions of as many, and leaves out
                 landscapes of more or fewer
@@ -36,7 +35,6 @@ from threadpoolctl import threadpool_limits
 
 import surehold as sh
 from benchmarks import robust_regret, smooth_regret
-from benchmarks.fourteen_kinds import KINDS, of_kind
 from benchmarks.generated_landscapes import BUDGETS, SHAPES, landscape
 from benchmarks.kept_runs import keep, kept
 from benchmarks.search_variants import begun, regret
@@ -50,14 +48,7 @@ GROUPS = {"all": (1, 8), "1-3 variables": (1, 3), "4-6 variables": (4, 6), "7-8 
 LEAST = 0.01
 SMOOTH = kernel_number("squared_exponential")
 #: subject -> (first seed, number of seeds)
-SEEDS = {
-    "landscapes": (330, 117),
-    "kinds": (336, 140),
-    "separable": (30, 60),
-    "robust": (200, 30),
-    "smooth": (10, 20),
-    "time": (0, 9),
-}
+SEEDS = {"landscapes": (330, 117), "separable": (30, 60), "robust": (200, 30), "smooth": (10, 20), "time": (0, 9)}
 NAMES = {
     "robust": ["needle-3", "many", "gm 0.02", "gm 0.01", "ridge"],
     "smooth": [name for name in smooth_regret.FUNCTIONS if not name.endswith("-wide")],
@@ -103,19 +94,6 @@ def on_landscape(seed):
     problem, design, (optimizer,) = begun(seed, "two_scales")
     for _ in range(BUDGETS[problem.dimension]):
         x = np.clip(design.pop(0) if design else optimizer.ask(), 0.0, 1.0)
-        optimizer.tell(x, problem(x))
-    return regret(problem, optimizer.recommend().x)
-
-
-def on_kind(seed):
-    """Return the final regret [%] on the function of a seed of the fourteen kinds."""
-    problem = of_kind(seed)
-    budget = BUDGETS[problem.dimension]
-    n_initial = min(sh.Optimizer.default_n_initial(problem.box), budget // 2)
-    design = qmc.LatinHypercube(problem.dimension, rng=np.random.default_rng([seed, 0, 98])).random(n_initial)
-    optimizer = sh.Optimizer(problem.box, n_initial=n_initial, seed=0, input_noise=problem.noise)
-    for i in range(budget):
-        x = np.clip(design[i] if i < n_initial else optimizer.ask(), 0.0, 1.0)
         optimizer.tell(x, problem(x))
     return regret(problem, optimizer.recommend().x)
 
@@ -186,12 +164,6 @@ def main():
             drawn = [seed for seed in seeds if low <= landscape(seed).dimension <= high]
             found = _kept(on_landscape, part, drawn, arguments.rows)
             for name, members in _groups(sorted(found)).items():
-                if len(members) > 1:
-                    _print_regrets(name, *np.array([found[seed] for seed in members]).T)
-        elif subject == "kinds":
-            found = _kept(on_kind, part, seeds, arguments.rows)
-            for name in ("all", *KINDS):
-                members = [seed for seed in sorted(found) if name in ("all", KINDS[seed % len(KINDS)])]
                 if len(members) > 1:
                     _print_regrets(name, *np.array([found[seed] for seed in members]).T)
         elif subject == "separable":

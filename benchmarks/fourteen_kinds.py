@@ -23,19 +23,14 @@ _PERTURBATIONS = 2**17  # of 2^11 the error would be larger than that of a model
 
 def _ring(rng, d):
     """A circular ridge in two variables, higher on one side; one hill along the others."""
-    c, radius, side, width = (
-        rng.uniform(0.35, 0.65, d),
-        rng.uniform(0.2, 0.35),
-        rng.uniform(0, 6.28),
-        rng.uniform(0.05, 0.09),
-    )
+    c, radius = rng.uniform(0.35, 0.65, d), rng.uniform(0.2, 0.35)
+    side, width = rng.uniform(0, 6.28), rng.uniform(0.05, 0.09)
 
     def f(x):
         a, b = x[:, 0] - c[0], x[:, 1] - c[1]
-        ridge = np.exp(-0.5 * ((np.hypot(a, b) - radius) / width) ** 2) * (
-            0.75 + 0.25 * np.cos(np.arctan2(b, a) - side)
-        )
-        return ridge * np.exp(-2.0 * ((x[:, 2:] - c[2:]) ** 2).sum(axis=1))
+        ridge = np.exp(-0.5 * ((np.hypot(a, b) - radius) / width) ** 2)
+        height = 0.75 + 0.25 * np.cos(np.arctan2(b, a) - side)
+        return ridge * height * np.exp(-2.0 * ((x[:, 2:] - c[2:]) ** 2).sum(axis=1))
 
     return f
 
@@ -161,9 +156,8 @@ def _periodic(rng, d):
     c, number = rng.uniform(0.2, 0.8, d), rng.uniform(2.5, 4.0, d)
 
     def f(x):
-        return np.prod(0.5 + 0.5 * np.cos(2 * np.pi * number * (x - c)), axis=1) ** 0.5 - 0.5 * ((x - c) ** 2).sum(
-            axis=1
-        )
+        hills = 0.5 + 0.5 * np.cos(2.0 * np.pi * number * (x - c))
+        return np.prod(hills, axis=1) ** 0.5 - 0.5 * ((x - c) ** 2).sum(axis=1)
 
     return f
 

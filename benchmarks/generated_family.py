@@ -85,29 +85,33 @@ def run(seed, run_seed, method, budget_share=1.0, of="training"):
 
 
 def _answers(problem, method, initial, budget, seed):
-    """Return the answers after half and all of the trials, and the last recommendation, None where there is none."""
-    waiting, answers, X, y = list(initial), [], [], []
+    """Return the answers after half and all of the trials, and the last recommendation, None of a method without."""
+    waiting, answers, X, y, stated = list(initial), [], [], [], None
     if method in OURS:
         settings = OURS[method]
         noise = {} if settings is None else {"input_noise": problem.noise}
         optimizer = sh.Optimizer(problem.box, n_initial=len(initial), seed=seed, **noise, **(settings or {}))
-        answer = (lambda: X[int(np.argmax(y))]) if settings is None else (lambda: optimizer.recommend().x)
     else:
         told = (
             {"perturbations": perturbations_of(_everywhere(problem), problem.dimension, seed)} if method in TOLD else {}
         )
         maker = installed_peers()[TOLD.get(method, method)]
         optimizer, waiting = maker(problem.dimension, initial, seed, **told), []
-        answer = optimizer.answer
     for i in range(budget):
         u = np.clip(waiting.pop(0) if waiting else optimizer.ask(), 0.0, 1.0)
         X.append(u)
         y.append(problem(u))
         optimizer.tell(u, y[-1])
-        if i + 1 in (budget // 2, budget):
-            answers.append(answer())
-    states = method in OURS and OURS[method] is not None
-    return answers, optimizer.recommend() if states else None
+        if i + 1 not in (budget // 2, budget):
+            continue
+        if method not in OURS:
+            answers.append(optimizer.answer())
+        elif settings is None:
+            answers.append(X[int(np.argmax(y))])
+        else:
+            stated = optimizer.recommend()
+            answers.append(stated.x)
+    return answers, stated
 
 
 def _everywhere(problem):
