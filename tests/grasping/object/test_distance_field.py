@@ -6,6 +6,7 @@ import pytest
 from surehold.errors import InputError
 from surehold.grasping.object.distance_field import MARGIN, cache_folder, distance_field_of
 from surehold.grasping.object.mesh_distance import FAR_INSIDE, FAR_OUTSIDE
+from surehold.grasping.object.mesh_files import load_mesh
 from surehold.grasping.object.shipped import OBJECTS, shipped_object
 from surehold.grasping.object.solids import signed_distance
 
@@ -76,6 +77,26 @@ def test_mesh_without_solids_has_the_same_field(tmp_path, monkeypatch):
     near = (exact.nodes[..., 0] > -FAR_INSIDE) & (exact.nodes[..., 0] < FAR_OUTSIDE)
     assert np.abs(error[near]).max() < 2e-5
     assert np.abs(error).max() < 0.25 * 0.006, "beyond, distances may be a bit too large"
+
+
+@pytest.mark.parametrize("subdivided", [False, True])
+def test_nodes_on_the_faces_of_a_mesh_know_its_normal(tmp_path, monkeypatch, subdivided):
+    pytest.importorskip("igl")
+    trimesh = pytest.importorskip("trimesh")
+    monkeypatch.setenv("SUREHOLD_CACHE", str(tmp_path))
+    half = np.array([0.020, 0.030, 0.040])  # whole numbers of cells: nodes of the grid lie on all six faces
+    box = trimesh.creation.box(2.0 * half)
+    (box.subdivide() if subdivided else box).export(tmp_path / "box.stl")
+    field = distance_field_of(load_mesh(tmp_path / "box.stl", unit="m").object, 0.002)
+    length = np.linalg.norm(field.nodes[..., 1:], axis=-1)
+    np.testing.assert_allclose(length[np.abs(field.nodes[..., 0]) < 0.003], 1.0, atol=1e-6)
+    rng = np.random.default_rng(0)
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            points = rng.uniform(-0.8, 0.8, (50, 3)) * half
+            points[:, axis] = side * half[axis]
+            normal = side * np.eye(3)[axis]
+            np.testing.assert_allclose(field.gradient(points), np.tile(normal, (50, 1)), atol=1e-6)
 
 
 @pytest.mark.parametrize("cell", [0.0, -1.0, float("nan"), 1e-5])

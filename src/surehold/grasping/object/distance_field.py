@@ -39,7 +39,7 @@ __all__ = [
 
 CELL: Final = 0.001  #: edge of a grid cell [m]
 MARGIN: Final = 0.016  #: how far the grid reaches beyond the object at least: a finger's radius and the soft touch [m]
-_FORMAT = 3  #: part of the content hash: a change of the layout must not find an old file
+_FORMAT = 4  #: part of the content hash: a change of the layout must not find an old file
 _CHUNK = 200_000
 
 

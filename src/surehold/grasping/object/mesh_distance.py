@@ -5,7 +5,9 @@
 Inside and outside are told apart by the fast winding number (Barill et al. 2018), to which small holes do no harm.
 Closest points are exact for nodes up to `FAR_OUTSIDE` outside and `FAR_INSIDE` inside, where contacts happen. For nodes
 beyond, whose closest points take long to find because many are about equally close, the best of the closest points of
-exact nodes nearby is taken: a point of the surface, at a distance that is too large by up to a quarter of a cell.
+exact nodes nearby is taken: a point of the surface, at a distance that is too large by up to a quarter of a cell. At a
+node that lies on the surface, as the nodes of a whole face do where its place is a multiple of the cell, x - c is
+rounding; the gradient there is the surface's own normal.
 """
 
 from collections.abc import Callable
@@ -22,6 +24,7 @@ __all__ = ["mesh_distance"]
 FAR_OUTSIDE: Final = 0.013  #: a finger's radius and the depth of a soft touch, and slack [m]
 FAR_INSIDE: Final = 0.004  #: skin and soft touch, and slack [m]
 _CHUNK = 20_000
+_ON_SURFACE: Final = 1e-9  # [m] below it the direction from the closest point is lost to rounding
 _ROUNDS = 3  # of offers between neighbors
 
 
@@ -71,6 +74,10 @@ def mesh_distance(
     nodes = np.empty((len(points), 4), dtype=np.float32)
     nodes[:, 0] = sign * length
     nodes[:, 1:] = away * (sign / np.where(length > 0.0, length, 1.0))[:, None]
+    touching = np.flatnonzero(length < _ON_SURFACE)
+    if len(touching):
+        pseudonormal = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+        nodes[touching, 1:] = igl.signed_distance(points[touching], obj.vertices, faces, pseudonormal)[3]
     return nodes
 
 
