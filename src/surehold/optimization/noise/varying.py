@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,6 @@ from surehold.optimization.noise.kinds import Root, root_of
 from surehold.optimization.noise.quadratures import Quadrature, quadrature
 
 __all__ = ["Varying"]
-
-_PLACES: Final = 4  # log2 of the number of places at which variables without noise in the middle are looked at
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,23 +34,14 @@ class Varying:
         return rng.standard_normal((n, box.dimension)) @ self._roots(box, u[None, :])[0].T
 
     def quadrature(self, box: Box, rule: str, k: float, exponent: int) -> tuple[Quadrature, Root | None]:
-        """Return the quadrature of standard normal variables and the function that returns their roots."""
-        standard = np.diag(self._shaken(box).astype(np.float64))
-        return quadrature(rule, standard, k, exponent=exponent), lambda U: self._roots(box, U)
+        """Return the quadrature of standard normal variables and the function that returns their roots.
+
+        All variables get points: one that is exact at any number of places may be noisy between them.
+        """
+        return quadrature(rule, np.eye(box.dimension), k, exponent=exponent), lambda U: self._roots(box, U)
 
     def _roots(self, box: Box, U: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.array([root_of(self.unit_covariance(box, x)) for x in box.from_unit(np.clip(U, 0.0, 1.0))])
-
-    def _shaken(self, box: Box) -> NDArray[np.bool_]:
-        """Tell which variables carry noise somewhere (d,); the middle of the box mostly answers alone."""
-        from scipy.stats import qmc
-
-        shaken = np.diag(self.unit_covariance(box)) > 0.0
-        if not shaken.all():
-            places = qmc.Sobol(box.dimension, scramble=False).random_base2(_PLACES) + 0.5 / 2**_PLACES
-            for x in box.from_unit(places):
-                shaken = shaken | (np.diag(self.unit_covariance(box, x)) > 0.0)
-        return shaken
 
     def _at(self, x: NDArray[np.float64], box: Box) -> Independent | Correlated:
         """Return the noise that the user's function states at x (d,), checked."""
