@@ -352,7 +352,8 @@ class Optimizer(Record):
     def predict(self, X: ArrayLike, *, under_noise: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the model's mean and standard deviation (q,) at X (q, d) in the box's units.
 
-        With `under_noise`, of the outcome averaged over the input noise instead.
+        With `under_noise`, of the outcome averaged over the input noise instead, by the perturbations that the search
+        uses: the deviation is the model's, and says nothing of how exact that average is (`recommend` takes more).
         """
         U = np.atleast_2d(self.box.to_unit(X))
         perturbations = self._ranking.accurate if under_noise else Perturbations(exact(self.box.dimension))

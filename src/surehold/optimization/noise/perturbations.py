@@ -14,16 +14,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import COARSE_CONDITIONS, QUASI_RANDOM_EXPONENT
+from surehold.defaults import QUASI_RANDOM_EXPONENT
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.kinds import Root
+from surehold.optimization.noise.pairing import under_conditions
 from surehold.optimization.noise.quadratures import QUADRATURES, Quadrature, exact, quadrature
-from surehold.optimization.noise.samples import representatives
 from surehold.optimization.surrogates.gaussian_process.closed_form import closed_form
 from surehold.optimization.surrogates.protocol import Moments, Posterior
-from surehold.optimization.uncontrolled import Conditions
 
 __all__ = ["BORDERS", "Allowed", "Perturbations"]
 
@@ -168,24 +167,3 @@ class Perturbations:
                 share[bad] = np.where(self.allowed(start[bad] + further[:, None] * offsets[bad]), further, share[bad])
                 step *= 0.5
         return (share[:, None] * offsets).reshape(points.shape)
-
-
-def under_conditions(points: Quadrature, conditions: Conditions, rule: str, exponent: int) -> Quadrature:
-    """Return a quadrature of the input noise with the values of uncontrolled variables in their columns.
-
-    Quasi-random points are paired with as many representative conditions, in a fixed random order; the few points of
-    the other rules are combined with each of 8.
-    """
-    paired = rule == "quasi_monte_carlo" and len(points.weights) > 1
-    count = 2**exponent if rule == "quasi_monte_carlo" else COARSE_CONDITIONS
-    taken = representatives(conditions.samples, count)
-    s, c = len(points.weights), len(taken.weights)
-    if paired:
-        rows = np.random.default_rng(0).permutation(np.arange(s) % c)
-        noise = points.offsets.copy()
-        weights = points.weights * (taken.weights / np.bincount(rows, points.weights, c))[rows]
-    else:
-        rows = np.tile(np.arange(c), s)
-        noise, weights = np.repeat(points.offsets, c, axis=0), np.repeat(points.weights, c) * taken.weights[rows]
-    noise[:, conditions.held] = taken.offsets[rows]
-    return Quadrature(noise, weights / weights.sum())
