@@ -155,7 +155,8 @@ ASCENT_LONGEST_STEP: Final = 0.25
 #: sufficient decrease of Nocedal and Wright 2006, section 3.1. Never measured.
 ASCENT_SUFFICIENT: Final = 1e-4
 ASCENT_SHORTEN: Final = 0.25
-#: An ascent ends when a step is shorter, in box widths, or gains less than this share of 1 + |value|. Never measured.
+#: An ascent ends when a step is shorter, in box widths, or gains less than this share of the values'
+#: spread, of 1 + |value| where that is a logarithm. Never measured.
 ASCENT_PRECISION: Final = 1e-8
 #: Where inputs are constrained, ascents stop at the border; the best one is followed by a random search: rounds, points
 #: in each, the first step in box widths, and the factor that shortens it after a round without success. Never measured.

@@ -321,7 +321,7 @@ class Optimizer(Record):
             else:
                 rng = self._rng(3, len(self._trials))
                 strict = None if self._requirements is None else self._requirements.strict(self._trials)
-                u, observed = self._snapped(ranking.best(posterior, history.tried, rng, strict)), np.nan
+                u, observed = self._snapped(ranking.best(posterior, history, rng, strict)), np.nan
             if self.box.uncontrolled is not None:
                 u = self.box.uncontrolled.at_mean(u)
             best = int(np.argmax(history.observed))

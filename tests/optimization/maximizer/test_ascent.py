@@ -35,6 +35,23 @@ def test_finds_the_top_of_a_bent_ridge(d):
         assert value >= -best.fun - 1e-4, f"{value} is below L-BFGS-B's {-best.fun}"
 
 
+@pytest.mark.parametrize(("scale", "offset"), [(1e-9, 0.0), (1e9, 0.0), (1.0, 1e5)])
+def test_where_it_ends_does_not_depend_on_the_unit_of_the_values(scale, offset):
+    """Against a difference of 1 all values of an amplitude of 1e-9 are equal, and those around 1e5 nearly so."""
+
+    class Scaled(Rosenbrock):
+        def __call__(self, U):
+            return scale * super().__call__(U) + offset
+
+        def with_gradient(self, U):
+            return self(U), scale * Rosenbrock.with_gradient(self, U)[1]
+
+    starts = np.random.default_rng(0).random((6, 2))
+    wanted, _ = climb(Rosenbrock(), starts, *whole(starts), evaluations=400, unit=1.0)
+    points, _ = climb(Scaled(), starts, *whole(starts), evaluations=400, unit=scale)
+    np.testing.assert_allclose(points, wanted, atol=1e-4)
+
+
 def test_each_ascent_is_as_if_it_were_alone():
     starts = np.random.default_rng(1).random((5, 3))
     points, values = climb(Rosenbrock(), starts, *whole(starts))

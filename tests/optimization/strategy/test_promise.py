@@ -61,6 +61,25 @@ def test_of_a_risk_measure(finer, posterior):
     assert 0.999 * expected <= found < 1.1 * expected, "between two points of the grid there is little more"
 
 
+@pytest.mark.parametrize("risk", ["mean", "cvar"])
+@pytest.mark.parametrize("noise", [None, 0.05])
+def test_it_is_in_the_unit_of_the_values(noise, risk):
+    if noise is None and risk != "mean":
+        pytest.skip("a risk is of an input noise")
+    rng = np.random.default_rng(3)
+    U = rng.random((20, 2))
+    values = np.exp(-8.0 * np.sum((U - 0.4) ** 2, axis=1)) + 0.3 * np.sin(9.0 * U[:, 0])
+    promised = []
+    for scale in (1.0, 2.0**-30):
+        optimizer = sh.Optimizer(
+            sh.Box.unit(2), seed=0, risk=risk, input_noise=None if noise is None else sh.InputNoise.unit(noise)
+        )
+        for u, value in zip(U, values, strict=True):
+            optimizer.tell(u, scale * value)
+        promised.append((optimizer.promise() / scale, optimizer.recommend("box").mean / scale))
+    assert promised[1] == pytest.approx(promised[0], rel=1e-5)
+
+
 def test_what_sigma_points_misjudge_is_found_by_more_points():
     """A steep polynomial, tried as if candidates were screened by sigma points: what is left to gain is not found."""
     problem = robust_problem("nes-polynomial")

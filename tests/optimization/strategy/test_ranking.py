@@ -97,7 +97,7 @@ def test_observed_values_decide_where_nothing_is_uncertain(posterior):
 @pytest.mark.parametrize("risk", ["mean", "mean-std", "cvar", "worst"])
 def test_the_best_input_of_the_box(risk, posterior):
     """With a risk measure the best tried input came back: everything counted as an infinite improvement."""
-    best = ranking_of(risk, finer=FINER).best(posterior, TRIED, np.random.default_rng(0))
+    best = ranking_of(risk, finer=FINER).best(posterior, HISTORY, np.random.default_rng(0))
     values = outcome(posterior, GRID, risk)
     found = outcome(posterior, best[None, :], risk)[0]
     assert found > values.max() - 0.02 * np.ptp(values)
@@ -108,7 +108,7 @@ def test_the_best_input_of_the_box_is_that_of_the_finer_perturbations(posterior)
     """Four perturbations alone put it elsewhere: their average is highest beside the best place."""
     few = Perturbations(quasi_monte_carlo(S, 2))
     best, alone = (
-        Ranking(few, few, Risk(), False, finer=finer).best(posterior, TRIED, np.random.default_rng(0))
+        Ranking(few, few, Risk(), False, finer=finer).best(posterior, HISTORY, np.random.default_rng(0))
         for finer in (FINER, None)
     )
     values = outcome(posterior, GRID)

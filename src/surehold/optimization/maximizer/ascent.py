@@ -14,7 +14,7 @@ BFGS (Nocedal and Wright 2006, formula 6.17) with backtracking; coordinates at a
 stay there, the others' steps are cut off at the borders (Bertsekas 1982).
 """
 
-from math import frexp, isfinite, ldexp, sqrt
+from math import frexp, isfinite, isnan, ldexp, nan, sqrt
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -51,10 +51,13 @@ def climb(
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
     evaluations: int = ASCENT_EVALUATIONS,
+    unit: float | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the points (a, d) reached from starts (a, d) inside boxes [lower, upper] (a, d), and their values (a,).
 
-    Each ascent makes up to `evaluations` evaluations with gradient. A start whose value is not finite stays.
+    Each ascent makes up to `evaluations` evaluations with gradient. A start whose value is not finite stays. `unit` is
+    how large a difference of values is, for values in the user's units: one too small to tell ends an ascent. None: a
+    difference of 1 and of the value itself, as of logarithms.
     """
     points = np.clip(starts, lower, upper)
     values, gradients = objective.with_gradient(points)
@@ -62,12 +65,13 @@ def climb(
     values = np.where(sound, values, -np.inf)
     alive = np.flatnonzero(sound)
     state = _State.at(points[alive], values[alive], gradients[alive], lower[alive], upper[alive])
+    size = nan if unit is None else unit
     for _ in range(evaluations - 1):
         if len(alive) == 0:
             break
         _propose(state)
         value, gradient = objective.with_gradient(state.V)
-        going = _advance(state, np.ascontiguousarray(value), np.ascontiguousarray(gradient))
+        going = _advance(state, np.ascontiguousarray(value), np.ascontiguousarray(gradient), size)
         points[alive], values[alive] = state.U, state.F
         if not going.all():
             alive, state = alive[going], _State._make(part[going] for part in state)
@@ -129,8 +133,11 @@ def _propose(state):
 
 
 @njit(cache=True)
-def _advance(state, value, gradient):
-    """Take the steps that gain enough, shorten the others, and return which ascents go on (r,)."""
+def _advance(state, value, gradient, size):
+    """Take the steps that gain enough, shorten the others, and return which ascents go on (r,).
+
+    `size` is that of a difference of values; NaN: 1 and the value itself.
+    """
     r, d = state.U.shape
     going = np.empty(r, dtype=np.bool_)
     S, Y, BY = np.empty(d), np.empty(d), np.empty(d)
@@ -158,7 +165,8 @@ def _advance(state, value, gradient):
             state.t[i] = 1.0
         else:
             state.t[i] *= ASCENT_SHORTEN
-        settled = better and gain <= ASCENT_PRECISION * (1.0 + abs(state.F[i]))
+        unit = 1.0 + abs(state.F[i]) if isnan(size) else size
+        settled = better and gain <= ASCENT_PRECISION * unit
         going[i] = moved > ASCENT_PRECISION and not settled
     return going
 

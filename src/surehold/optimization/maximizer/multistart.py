@@ -50,6 +50,7 @@ def multistart(
     rng: np.random.Generator,
     regions: Regions | None = None,
     admission: Admits | None = None,
+    unit: float | None = None,
 ) -> NDArray[np.float64]:
     """Return points (c, d) worth trying, best first: gradient ascents from a Sobol sequence and perturbed anchors.
 
@@ -63,6 +64,8 @@ def multistart(
         Boxes, together a box, in each of which candidates are laid and which no ascent leaves; None: the whole cube.
     admission
         Which points can be tried; None: all. Only such are returned: none at all, (0, d), where none is found.
+    unit
+        How large a difference of the objective is, see `climb`.
     """
     regions = regions or Regions.whole(dimension)
     points = promising(dimension, anchors, rng, regions)
@@ -77,12 +80,13 @@ def multistart(
     if len(regions.lower) > 1:  # the best candidate of each of the best regions, then the best ones wherever they are
         leaders = np.sort(np.unique(home, return_index=True)[1])[:STARTS_IN_REGIONS]
         starts = sorted({*leaders.tolist(), *starts})
-    tops, values = climb(objective, points[starts], regions.lower[home[starts]], regions.upper[home[starts]])
+    lower, upper = regions.lower[home[starts]], regions.upper[home[starts]]
+    tops, values = climb(objective, points[starts], lower, upper, unit=unit)
     if regions.separable and dimension > FEW_VARIABLES:
         better = exchanged(screen, tops[np.argmax(values)], regions.lower.min(axis=0), regions.upper.max(axis=0), rng)
         if better is not None:
             i = _regions_of(better[None, :], regions)
-            top, value = climb(objective, better[None, :], regions.lower[i], regions.upper[i])
+            top, value = climb(objective, better[None, :], regions.lower[i], regions.upper[i], unit=unit)
             tops, values = np.concatenate([tops, top]), np.concatenate([values, value])
     order = np.argsort(-values, kind="stable")
     if admission is not None:  # ascents stop at a border which is no box's; the best one goes along it

@@ -64,6 +64,7 @@ class ExpectedImprovement:
             rng,
             regions,
             history.admission,
+            history.spread if self.criterion.base in ("ei", "ucb") else None,
         )
         if not len(found):
             return found

@@ -32,7 +32,9 @@ def promise(ranking: Ranking, posterior: Posterior, history: History, rng: np.ra
         Acquisition(posterior, CriterionName("ei", scale), perturbations, best)
         for perturbations in (ranking.accurate, ranking.accurate if ranking.exact_inputs else ranking.screen)
     )
-    found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, history.admission)
+    found = multistart(
+        objective, screen, anchors.shape[1], anchors, rng, posterior.regions, history.admission, history.spread
+    )
     if history.admission is not None:
         if not len(found):
             return 0.0

@@ -96,16 +96,16 @@ class Ranking:
     def best(
         self,
         posterior: Posterior,
-        tried: NDArray[np.float64],
+        history: History,
         rng: np.random.Generator,
         admission: Admission | None = None,
     ) -> NDArray[np.float64]:
-        """Return the point of the cube (d,) with the best modelled outcome; `tried` (n, d) guide the search.
+        """Return the point of the cube (d,) with the best modelled outcome; what was tried guides the search.
 
         The best of those found climb on by the finer perturbations, by the corrected measure where there is a risk, and
         these decide: a measure by few of them is highest a little beside the best place.
         """
-        anchors = tried[self.order(posterior, tried)[:ANCHORS]]
+        anchors, unit = history.tried[self.order(posterior, history.tried)[:ANCHORS]], history.spread
         if self.risk.name == "mean":
             finer = self.accurate if self.finer is None else self.finer
             objective, screen, last = (_mean_outcome(posterior, rule) for rule in (self.accurate, self.screen, finer))
@@ -113,10 +113,10 @@ class Ranking:
             some = posterior if self.risk.name == "worst" else posterior.thinned(SCREENING_DIVISOR)
             objective = screen = self._expected(some)
             last = objective.corrected(self.correction(posterior))
-        found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, admission)
+        found = multistart(objective, screen, anchors.shape[1], anchors, rng, posterior.regions, admission, unit)
         candidates = np.concatenate([anchors[:1], found[:ANCHORS]])
         if self.finer is not None and admission is None:
-            candidates, _ = climb(last, candidates, np.zeros_like(candidates), np.ones_like(candidates))
+            candidates, _ = climb(last, candidates, np.zeros_like(candidates), np.ones_like(candidates), unit=unit)
         return candidates[np.argmax(last(candidates))]
 
     def trials(self, posterior: Posterior, history: History, exactly: bool) -> NDArray[np.intp]:

@@ -42,7 +42,8 @@ class RiskAverse:
             regions = self.trust_region.within(regions, best[0], history.observed)
         if risk.name == "worst":
             bound = WorstCaseBound(posterior, accurate, self.kappa)
-            found = multistart(bound, bound, best.shape[1], best[:ANCHORS], rng, regions, history.admission)
+            d, admission = best.shape[1], history.admission
+            found = multistart(bound, bound, d, best[:ANCHORS], rng, regions, admission, history.spread)
             if not len(found):
                 return found
             return np.concatenate([bound.to_try(found[0]), found])
@@ -80,7 +81,8 @@ def most_improving(
     measure = RiskImprovement(posterior, ranking.accurate, ranking.risk, None, rng)
     known = np.concatenate([best, history.pending])
     improvement, admission = measure.over(known), history.admission
-    found = multistart(improvement, improvement, best.shape[1], best[:ANCHORS], rng, regions, admission)
+    unit = history.spread
+    found = multistart(improvement, improvement, best.shape[1], best[:ANCHORS], rng, regions, admission, unit)
     if not len(found):
         return found, 0.0
     corrected = measure.corrected(finer).over(known)
@@ -88,7 +90,7 @@ def most_improving(
     tops, start = found[:STARTS], (best if admission is None else best[admission.possible(best)])[:1]
     if finer is not None and len(start):
         lower, upper = regions.lower.min(axis=0)[None, :], regions.upper.max(axis=0)[None, :]
-        beside, _ = climb(objective, start, lower, upper, LAST_EVALUATIONS)
+        beside, _ = climb(objective, start, lower, upper, LAST_EVALUATIONS, unit)
         tops = np.concatenate([beside, tops])
     gains = objective(tops)
     order = np.argsort(-gains, kind="stable")
