@@ -102,6 +102,16 @@ def test_constant_outcomes_and_awkward_names(rkhs_report):
         ElementTree.fromstring(figures.svg_text(figure, name))
 
 
+def test_a_map_that_is_flat_but_for_rounding_is_drawn_flat(gm_report):
+    bent = np.linspace(0.3, np.nextafter(np.nextafter(0.3, 1.0), 1.0), gm_report.surfaces[0].mean.size)
+    level = bent.reshape(gm_report.surfaces[0].mean.shape)
+    flat = replace(gm_report, surfaces=(replace(gm_report.surfaces[0], mean=level, robust_mean=level),))
+    for figure in figures.figures(flat).values():
+        for axes in figure.axes:
+            for image in axes.images:
+                assert image.norm.vmin == image.norm.vmax
+
+
 def test_all_failed_but_one(gm_report):
     y = np.full(gm_report.y.size, np.nan)
     y[-1] = 1.0

@@ -19,6 +19,7 @@ __all__ = ["PALETTE", "draw_line", "draw_map", "draw_shake", "draw_trace", "mark
 PALETTE: Final = {"ink": "#1b1f25", "muted": "#68707b", "grid": "#d8dce2", "high": "#c24e00", "answer": "#0a65b3"}
 _SHARES: Final = (-0.05, 1.05)  # limits of an axis of shares, with room for marks at 0 and 1
 _ROUND: Final = 121  # points of an ellipse
+_FLAT: Final = 1e-9  # share of the values below which a map has one
 _MARKERS: Final = {"high": "^", "answer": "o"}
 _STYLE: Final = {
     "font.family": "sans-serif",
@@ -122,6 +123,8 @@ def draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> No
     values = view.robust_mean if robust and view.robust_mean is not None else view.mean
     both = [v for v in (view.mean, view.robust_mean) if v is not None]
     low, high = min(float(v.min()) for v in both), max(float(v.max()) for v in both)
+    if high - low <= _FLAT * max(abs(low), abs(high)):  # rounding would fill all colors, and lines need levels apart
+        high = low
     i, j = view.variables
     pair = first, second = report.variables[i], report.variables[j]
     a, b = (variable.shown(grid) for variable, grid in zip(pair, view.axes, strict=True))
