@@ -236,6 +236,28 @@ def test_a_robot_tells_contacts_and_the_next_trial_follows_from_them(here, capsy
     assert json.loads(capsys.readouterr().out)["trial"] == 0
 
 
+def test_the_answer_is_a_trial_that_held_and_the_report_has_the_same(here, capsys):
+    assert surehold("explore --box 0.08,0.08,0.12 --study cup --variables dx,dy,dz --facet right-front") == 0
+    for _ in range(3):
+        assert surehold("study ask cup --json") == 0
+    held = {}
+    for trial, value in enumerate((0.0, 0.9, -0.1)):  # on the shapes that are possible trial 0 would be the best
+        held[trial] = value > 0.0
+        assert surehold(f"study tell cup {trial} {value}") == 0
+    capsys.readouterr()
+    assert surehold("study recommend cup --json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert held[answer["trial"]]
+    from surehold.reports.study_report import study_report
+    from surehold.studies.robot import RobotStudy
+
+    report = study_report(RobotStudy.open("cup"))
+    (shown,) = report.candidates
+    assert shown.trial == answer["trial"]
+    assert shown.predicted_mean == pytest.approx(answer["mean"])
+    assert "of the shapes that are possible" in " ".join(report.notes)
+
+
 def test_files_of_a_study_are_found_from_any_folder(here, monkeypatch):
     (here / "hand.xml").write_text(three_fingers())
     assert surehold("hand new hand.xml") == 0

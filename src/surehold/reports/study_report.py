@@ -23,6 +23,10 @@ def study_report(study: RobotStudy) -> RunReport:
     shown: dict[str, Any] = {"study": study.name, "storage": study.storage.shown, **settings.optimizer}
     pending = sum(not trial.state.is_finished() for trial in study.trials())
     notes = [f"{pending} trial{'s are' if pending > 1 else ' is'} still under way."] if pending else []
+    if study.touches:
+        notes.append(
+            "What is expected of the answer is of the shapes that are possible; the maps are of the values told."
+        )
     reason = study.paused or study.stopped()
     if reason:
         notes.append(f"The study is {'paused' if study.paused else 'stopped'}: {reason}.")

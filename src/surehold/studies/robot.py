@@ -226,6 +226,11 @@ class RobotStudy(OpenedStudy):
         with self.storage.failures():
             self._ledger.veto(id, reason or "no reason given")
 
+    @property
+    def touches(self) -> bool:
+        """Whether the study is about a shape that is not known, of which trials tell contacts."""
+        return self._touched is not None
+
     # --- looking --------------------------------------------------------------------------------------------------
 
     def recommend(self, *, write: bool = True) -> StudyRecommendation:

@@ -64,7 +64,11 @@ class TouchedShape:
         return space.complete(self.problem.box.as_dict(run.ask(history_of(trials, space).pending)))
 
     def recommend(self, trials: Sequence[FrozenTrial], space: SearchSpace) -> StudyRecommendation:
-        """Return the trial of highest expected value under shape and hand noise; raises InputError if there is none."""
+        """Return the trial of highest expected value under shape and hand noise, of those that held if any did.
+
+        What is expected is of the shapes that are possible; of what was told of the value its sign alone counts. Raises
+        InputError if no trial has told one.
+        """
         run = self._told(trials, space)
         history = history_of(trials, space)
         if not np.isfinite(history.y).any():

@@ -156,9 +156,14 @@ class Exploration:
             self.belief = self.belief.knowing(told, np.vstack([self._seen, self._free]))
 
     def recommend(self, tried: bool = False) -> ExploredGrasp:
-        """Return the grasp that is expected to hold best under shape and hand noise; `tried`: of the trials told."""
+        """Return the grasp that is expected to hold best under shape and hand noise.
+
+        `tried`: of the trials told, of those alone that held, with a value above 0, where there are any.
+        """
         imagined = self._imagined()
-        candidates = self.X if tried else np.vstack([self.X, self._candidates()])
+        held = self.X[self.y > 0.0]
+        told = held if len(held) else self.X
+        candidates = told if tried else np.vstack([self.X, self._candidates()])
         first = np.array([imagined.over_shapes(x).mean() for x in candidates])
         answers = []
         for k in np.argsort(-first, kind="stable")[:_ANSWERS]:
