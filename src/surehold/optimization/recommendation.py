@@ -132,7 +132,8 @@ class Recommendation:
     outputs : dict
         {name: Outcome} of the further outputs of one execution.
     by_risk
-        What x is expected to be worth by the risk measure that was asked for; None where that is the mean.
+        What x is expected to be worth by the risk measure that was asked for; None where that is the mean. Unlike
+        `quantile` and `execution` it is of the response, without the noise of observations.
     outside : dict
         {name: share of executions that leave the box along this variable}, of shares from 0.01 on. Nothing can be tried
         there: what is expected of these executions rests on the model alone. Empty with `border="clip"` or "keep".

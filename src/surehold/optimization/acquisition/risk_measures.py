@@ -32,7 +32,7 @@ _PARAMETERS: Final = {"mean-std": "beta", "mean-variance": "beta", "var": "alpha
 
 @dataclass(frozen=True)
 class Risk:
-    """A risk measure of the outcome under input noise.
+    """A risk measure of the outcome under input noise, without the noise of observations.
 
     "mean": the expected outcome. "mean-std": mean - beta standard deviations. "mean-variance": mean - beta variances.
     "var": value at risk, the outcome that a share alpha of executions falls below. "cvar": the mean of that share
