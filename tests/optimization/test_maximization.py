@@ -327,8 +327,8 @@ def test_fixed_variables_keep_their_value():
     [
         ({"direction": "down"}, "direction 'down' is unknown"),
         ({"fixed": {"y": 1.0}}, "fixed variable 'y' is unknown"),
-        ({"fixed": {"x": 9.0}}, "not inside"),
-        ({"fixed": {"x": "much"}}, "not numeric"),
+        ({"fixed": {"x": 9.0}}, "x = 9 lies outside its range"),
+        ({"fixed": {"x": "much"}}, "give a finite number"),
         ({"fixed": {"x": 0.5}}, "every variable is fixed"),
         ({"initial_points": [[9.0]]}, "not inside"),
         ({"initial_points": [[0.1, 0.2]]}, "shape"),

@@ -208,3 +208,36 @@ def test_a_number_names_the_choice_that_is_written_like_it():
 
 def test_bounds_that_are_close_are_shown_apart():
     assert repr(Box({"x": (1e12, 1e12 + 0.5)})) == "Box({'x': (1000000000000.0, 1000000000000.5)})"
+
+
+@pytest.mark.parametrize(
+    ("fixed", "message"),
+    [
+        ({"turn": 0.3}, "turn = 0.3 is no level"),
+        ({"fingers": 3.4}, "fingers = 3.4 is no level"),
+        ({"turn": 1.5}, "turn = 1.5 lies outside its range"),
+        ({"force": "strong"}, "force is 'strong'; give a finite number"),
+    ],
+)
+def test_what_is_fixed_can_be_tried(fixed, message):
+    with pytest.raises(InputError, match=message):
+        Optimizer(BOX, fixed=fixed)
+
+
+def test_what_nobody_can_command_was_not_tried():
+    box = Box({"turn": (-1.0, 1.0, "step=0.25"), "batch": (1, 1000, "int", "log"), "x": (0.0, 1.0)})
+    optimizer = Optimizer(box)
+    for point, message in (
+        ({"turn": 0.3, "batch": 3, "x": 0.5}, "turn = 0.3 is no level; it goes from -1 in steps of 0.25"),
+        ({"turn": 0.25, "batch": 2.5, "x": 0.5}, "batch = 2.5 is no level"),
+        ([0.25, np.log(2.5), 0.5], "batch = 2.5 is no level"),
+    ):
+        with pytest.raises(InputError, match=message):
+            optimizer.tell(point, 1.0)
+    assert len(optimizer.y) == 0
+    optimizer.tell({"turn": 0.25, "batch": 3, "x": 0.5}, 1.0, reached={"turn": 0.3, "batch": 2.5, "x": 0.5})
+    for k in (1, 2, 7, 999, 1000):
+        optimizer.tell(np.float32(box.points({"turn": -0.75, "batch": k, "x": 0.1})), 1.0)
+    trial = optimizer.ask_trial()
+    optimizer.tell(trial.parameters | {"turn": trial.parameters["turn"] + 0.01}, 1.0)  # what was asked for, rounded
+    assert len(optimizer.pending) == 0

@@ -71,20 +71,20 @@ def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | No
     Raises
     ------
     InputError
-        If a name is unknown, a value is no number inside of the box, or no variable is left.
+        If a name is unknown, a value is none that can be tried, or no variable is left.
     """
     lattice = None if box.smooth.all() else Lattice(box.snap, box.smooth)
     if not fixed:
         return lattice
-    names = [variable.name for variable in box.variables]
-    for name in fixed:
-        if name not in names:
-            raise unknown_name("fixed variable", name, names)
+    variables = {variable.name: variable for variable in box.variables}
+    kept: dict[str, Any] = {}
+    for name, value in fixed.items():
+        if name not in variables:
+            raise unknown_name("fixed variable", name, variables)
         if box.uncontrolled is not None and box.uncontrolled.held[box.columns(name)].any():
             raise InputError(f"fixed names '{name}', which is uncontrolled: nobody sets it; leave it out.")
-    x = box.points({**box.as_dict(box.from_unit(np.full(box.dimension, 0.5))), **fixed})
-    if not box.contains(x):
-        raise InputError(f"fixed is {dict(fixed)!r}, which is not inside {box}.")
+        kept[name] = variables[name].checked(value, "fixed")
+    x = box.points({**box.as_dict(box.from_unit(np.full(box.dimension, 0.5))), **kept})
     held = np.zeros(box.dimension, dtype=bool)
     for name in fixed:
         held[box.columns(name)] = True

@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from surehold.errors import InputError
 from surehold.optimization.box import Box
+from surehold.optimization.variables import Number
 
-__all__ = ["initial_inputs", "trial_input", "trial_inputs"]
+__all__ = ["check_levels", "initial_inputs", "trial_input", "trial_inputs"]
 
 # A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
 # it stay finite.
@@ -41,6 +42,23 @@ def trial_input(box: Box, name: str, x: Any) -> NDArray[np.float64]:
     if not np.all(np.isfinite(points)):
         raise InputError(f"{name} is {points.tolist()}; every coordinate must be a finite number.")
     return u
+
+
+def check_levels(box: Box, name: str, x: Any) -> None:
+    """Raise InputError where the point x (d,) lies between two levels by more than rounding: nobody can command it."""
+    points, rounding = box.points(x), box.rounding
+    for variable in box.variables:
+        if not isinstance(variable, Number) or not variable.step:
+            continue
+        own = box.columns(variable.name)
+        level = variable.to_value(points[own])
+        if np.any(np.abs(variable.to_coordinate(level) - points[own]) > rounding[own]):
+            (value,) = variable.from_coordinate(points[own])
+            raise InputError(
+                f"{name}: {variable.name} = {value:g} is no level; it goes from {variable.low:g} in steps of "
+                f"{variable.step:g}. Tell the level that was commanded, and, where it went astray, "
+                "tell(x, y, reached=...)."
+            )
 
 
 def _near(box: Box, points: NDArray[np.float64]) -> NDArray[np.float64]:

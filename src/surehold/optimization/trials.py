@@ -18,7 +18,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit, checked_outputs
 from surehold.optimization.stored_trials import checked_columns
-from surehold.optimization.trial_inputs import trial_input, trial_inputs
+from surehold.optimization.trial_inputs import check_levels, trial_input, trial_inputs
 from surehold.optimization.values import (
     number_of,
     outliers_among,
@@ -336,6 +336,8 @@ class Trials:
         u = trial_input(self._box, "x", x)
         number = self._waiting(u)
         if np.all((u >= 0.0) & (u <= 1.0)):
+            if number is None:  # what was asked for may have been rounded by the rig
+                check_levels(self._box, "x", x)
             return number, u, u
         if number is None:
             raise InputError(

@@ -54,9 +54,13 @@ class Number(NamedTuple):
         """Return the coordinates of values."""
         return np.log(values) if self.log else values
 
+    def from_coordinate(self, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values at coordinates, whether they can be tried or not."""
+        return np.exp(coordinates) if self.log else coordinates
+
     def to_value(self, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the nearest values that can be tried."""
-        values = np.exp(coordinates) if self.log else coordinates
+        values = self.from_coordinate(coordinates)
         if self.step:
             values = self.low + self.step * np.round((values - self.low) / self.step)
         return np.clip(values, self.low, self.high)
