@@ -129,6 +129,7 @@ def test_such_a_box_hands_out_trials_by_name_only():
         ((0.0, 1.0, "log"), "logarithmic variable is positive"),
         ((0.0, 1.5, "int"), "whole numbers"),
         ((0.0, 1.0, "step=2"), "wider than its range"),
+        ((0, 3, "int", "step=4"), "wider than its range"),
         ((0.0, 1.0, "step=-1"), "step"),
         ((0.1, 1.0, "log", "step=0.1"), "logarithmic and has steps"),
         ((0.0, 1.0, "lin"), "'log', 'int'"),
@@ -204,6 +205,15 @@ def test_a_number_names_the_choice_that_is_written_like_it():
     assert [box.as_dict(box.points({"grip": given}))["grip"] for given in (7, np.int64(7), True)] == ["7", "7", "True"]
     with pytest.raises(InputError, match="choice for 'grip' '8' is unknown"):
         box.points({"grip": 8})
+
+
+def test_the_last_level_of_whole_numbers_is_the_upper_bound():
+    box = Box({"n": (0, 10, "int", "step=4")})
+    levels = {box.as_dict(box.from_unit([u]))["n"] for u in np.linspace(0.0, 1.0, 25)}
+    assert levels == {0, 4, 8}
+    assert (box.lower, box.upper) == ([-2.0], [10.0]), "cells of equal width"
+    assert box == Box({"n": (0, 8, "int", "step=4")})
+    assert Box({"n": (0, 10**15, "int")}).as_dict([1e15])["n"] == 10**15
 
 
 def test_bounds_that_are_close_are_shown_apart():

@@ -214,12 +214,14 @@ def _number(name: str, lower: float, upper: float, words: list[str]) -> Number:
         step = step or 1.0
         if not (lower.is_integer() and upper.is_integer() and step.is_integer()):
             raise InputError(f"variable '{name}' goes from {lower:g} to {upper:g} by {step:g}; give whole numbers.")
-        return Number(name, int(lower), int(upper), step, log, True)
     if step:
-        levels = np.floor((upper - lower) / step * (1.0 + 1e-12))
+        slack = 0.0 if integer else 1e-12  # steps such as 0.1 are rounded
+        levels = np.floor((upper - lower) / step * (1.0 + slack))
         if levels < 1:
             raise InputError(f"variable '{name}' has steps of {step:g}, wider than its range; give smaller ones.")
         upper = lower + step * float(levels)
+    if integer:
+        return Number(name, int(lower), int(upper), step, log, True)
     return Number(name, lower, upper, step, log)
 
 
