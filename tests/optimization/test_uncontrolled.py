@@ -127,6 +127,20 @@ def test_bad_conditions(uncontrolled, message):
         Box({"x": (0.0, 1.0)}, uncontrolled=uncontrolled)
 
 
+@pytest.mark.parametrize(
+    ("bounds", "message"),
+    [
+        ((1.0, 1000.0, "log"), r"'w' is uncontrolled, but logarithmic; its bounds are \(1, 1000\) alone"),
+        ((0, 5, "int"), "'w' is uncontrolled, but in steps"),
+        ((0.0, 5.0, "step=0.5"), "'w' is uncontrolled, but in steps"),
+        (["light", "heavy"], "'w' is uncontrolled, but a choice"),
+    ],
+)
+def test_what_nobody_sets_is_a_plain_number(bounds, message):
+    with pytest.raises(InputError, match=message):
+        Box({"x": (0.0, 1.0), "w": bounds}, uncontrolled={"w": [1.0, 2.0, 3.0]})
+
+
 def test_samples_outside_of_the_bounds():
     with pytest.raises(InputError, match="reach from 1 to 3, but its bounds are"):
         Box({"x": (0.0, 1.0), "w": (0.0, 2.0)}, uncontrolled={"w": [1.0, 3.0]})

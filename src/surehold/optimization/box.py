@@ -47,7 +47,8 @@ class Box:
     Raises
     ------
     InputError
-        If there is no variable, a name is not a non-empty string, or bounds are reversed, equal or not finite.
+        If there is no variable, a name is not a non-empty string, bounds are reversed, equal or not finite, or an
+        uncontrolled variable is no plain number.
 
     Examples
     --------
@@ -81,7 +82,9 @@ class Box:
         self.names: Final[tuple[str, ...]] = tuple(names)
         self.lower: Final[NDArray[np.float64]] = np.array([pair[0] for pair in limits])
         self.upper: Final[NDArray[np.float64]] = np.array([pair[1] for pair in limits])
-        self.uncontrolled: Final[Conditions | None] = conditions_of(self.names, self.lower, self.upper, uncontrolled)
+        self.uncontrolled: Final[Conditions | None] = conditions_of(
+            self.variables, self.names, self.lower, self.upper, uncontrolled
+        )
         self.lower.flags.writeable = False
         self.upper.flags.writeable = False
 

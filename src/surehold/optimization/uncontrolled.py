@@ -3,7 +3,7 @@
 Legend: u uncontrolled variables among the d of a box; N samples of them, equally likely, in the unit cube, (N, u).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.optimization.variables import Number, Variable
 
 __all__ = ["Conditions", "bounds_of", "conditions_of"]
 
@@ -62,18 +63,20 @@ def bounds_of(bounds: Mapping[str, Any], uncontrolled: Mapping[Any, Any] | None)
 
 
 def conditions_of(
+    variables: Sequence[Variable],
     names: tuple[str, ...],
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
     uncontrolled: Mapping[Any, Any] | None,
 ) -> Conditions | None:
-    """Return the distribution of the uncontrolled variables of a box, None where there are none.
+    """Return the distribution of the uncontrolled variables of a box, None where there are none; names of coordinates.
 
-    Raises InputError where samples lie outside the bounds, or nothing is left to be controlled.
+    Raises InputError where one is no plain number, samples lie outside the bounds, or nothing is left to be controlled.
     """
     groups = _groups(uncontrolled)
     if not groups:
         return None
+    _check_plain(variables, groups)
     if len(groups) == 1 and not hasattr(next(iter(groups.values())), "ppf"):
         columns = dict(zip(next(iter(groups)), next(iter(groups.values())).T, strict=True))
     else:
@@ -96,6 +99,21 @@ def conditions_of(
         kept.append(np.clip(values, low, high))
         samples.append((kept[-1] - low) / (high - low))
     return Conditions(held, np.stack(samples, axis=1), np.stack(kept, axis=1))
+
+
+def _check_plain(variables: Sequence[Variable], groups: Groups) -> None:
+    """Raise InputError where an uncontrolled variable is in steps, logarithmic or a choice: samples are coordinates."""
+    for variable in variables:
+        if not any(variable.name in group for group in groups):
+            continue
+        if not isinstance(variable, Number):
+            raise InputError(f"'{variable.name}' is uncontrolled, but a choice; leave it out, or give it numbers.")
+        if variable.log or variable.step:
+            kind = "logarithmic" if variable.log else "in steps"
+            raise InputError(
+                f"'{variable.name}' is uncontrolled, but {kind}; its bounds are ({variable.low:g}, {variable.high:g}) "
+                "alone, or left out."
+            )
 
 
 def _groups(uncontrolled: Mapping[Any, Any] | None) -> Groups:
