@@ -48,6 +48,26 @@ def test_a_loaded_optimizer_goes_on_as_the_saved_one(tmp_path, settings):
     assert np.array_equal(loaded.ask(2), saved.ask(2))
 
 
+def test_an_infinite_limit_is_none(tmp_path):
+    limits = {"force": (-np.inf, 0.5), "torque": (np.float32(0.0), np.inf), "heat": (-np.inf, np.inf)}
+    saved = Optimizer(BOX, constraints=limits, n_initial=4, seed=0)
+    for _ in range(6):
+        x = saved.ask()
+        saved.tell(x, -float(x @ x), constraints={"force": float(x[0]), "torque": float(x[1])})
+    saved.save(tmp_path / "run.json")
+    stored = json.loads((tmp_path / "run.json").read_text())["settings"]["constraints"]
+    assert stored == {"force": [None, 0.5], "torque": [0.0, None], "heat": [None, None]}
+    loaded = Optimizer.load(tmp_path / "run.json")
+    assert loaded.limits == saved.limits
+    assert np.array_equal(loaded.ask(), saved.ask())
+
+
+def test_parameters_of_a_risk_may_be_of_numpy(tmp_path):
+    saved = Optimizer(BOX, input_noise=InputNoise.unit(0.05), risk=Risk("cvar", alpha=np.float32(0.25)))
+    saved.save(tmp_path / "run.json")
+    assert Optimizer.load(tmp_path / "run.json").risk == Risk("cvar", alpha=0.25)
+
+
 def test_before_any_trial(tmp_path):
     Optimizer(BOX, seed=2).save(tmp_path / "run.json")
     assert np.array_equal(Optimizer.load(tmp_path / "run.json").ask(), Optimizer(BOX, seed=2).ask())

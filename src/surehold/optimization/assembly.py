@@ -177,7 +177,10 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
         rest = requirements.initial(rest, first, rng)
     if lattice is not None and thesis is None and not strategy.ranking.noisy:
         rest = lattice.distinct(rest, first, rng, None if region is None else region.contains)
-    stored = {"initial_points": None if s.initial_points is None else box.from_unit(first).tolist()}
+    stored = {
+        "initial_points": None if s.initial_points is None else box.from_unit(first).tolist(),
+        "constraints": None if s.constraints is None else {limit.name: limit.stated for limit in limits},
+    }
     return Parts(
         settings={**settings, **stored},
         input_noise=input_noise,

@@ -29,6 +29,11 @@ class Limit:
         """Whether the output has no limit and is recorded only."""
         return self.lower == -np.inf and self.upper == np.inf
 
+    @property
+    def stated(self) -> tuple[float | None, float | None]:
+        """The limits as `limits_of` takes them and a file can hold them."""
+        return (None if self.lower == -np.inf else self.lower, None if self.upper == np.inf else self.upper)
+
     def missed_by(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return by how much values are beyond the nearer limit: negative inside, NaN of NaN."""
         return np.maximum(self.lower - values, values - self.upper)

@@ -135,7 +135,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, InputNoise) and not value.varies:
         return {"input noise": value.to_json()}
     if isinstance(value, Risk):
-        return {"risk": asdict(value)}
+        return {"risk": _plain(asdict(value))}
     if isinstance(value, Linear):
         return {"linear": asdict(value)}
     if isinstance(value, Mapping):
