@@ -118,3 +118,11 @@ def test_bad_input():
         sh.maximize(utility, BOX, 10, outcome="preference")
     with pytest.raises(InputError, match="a study keeps no preferences"):
         sh.Sampler(BOX, outcome="preference")
+
+
+def test_a_trial_of_another_optimizer_is_not_compared():
+    optimizer, other = (sh.Optimizer(BOX, outcome="preference", seed=seed) for seed in (0, 1))
+    optimizer.tell_preference(optimizer.ask_trial(), [0.5, 0.5])
+    with pytest.raises(InputError, match="belongs to another optimizer"):
+        optimizer.tell_preference(other.ask_trial(), [0.9, 0.9])
+    assert len(optimizer.X) == 2

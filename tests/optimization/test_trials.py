@@ -109,6 +109,26 @@ def test_an_asked_trial_knows_its_number():
     assert optimizer.ask_trial().number == 0
 
 
+@pytest.mark.parametrize(
+    ("other", "shown"),
+    [
+        (Optimizer(Box({"n": (1, 9, "int"), "b": (0.0, 1.0)}), initial_points=[{"n": 7, "b": 0.25}]), "'n': 7"),
+        (Optimizer(Box({"a": (0.0, 1.0)}), initial_points=[[0.75]]), r"\[0.75\]"),
+    ],
+)
+def test_a_trial_of_another_optimizer_is_refused(other, shown):
+    optimizer = Optimizer(Box({"n": (1, 9, "int"), "b": (0.0, 1.0)}), initial_points=[{"n": 2, "b": 0.5}])
+    own, foreign = optimizer.ask_trial(), other.ask_trial()
+    words = f"trial 0 at .*{shown}.* belongs to another optimizer: here trial 0 is at .*'n': 2, 'b': 0.5"
+    with pytest.raises(InputError, match=words):
+        optimizer.tell(foreign, 3.0)
+    with pytest.raises(InputError, match=words):
+        optimizer.forget(foreign)
+    assert len(optimizer.y) == 0
+    optimizer.tell(AskedTrial(0, np.float32(own.x)), 3.0)
+    assert len(optimizer.pending) == 0
+
+
 def test_a_number_that_was_dropped_is_asked_for_again_and_no_other_twice():
     optimizer = Optimizer(Box.unit(2), n_initial=6, seed=4)
     points = optimizer.ask(3)

@@ -129,9 +129,9 @@ class Record(ABC):
         ------
         InputError
             If x or reached has the wrong shape, other names or is not finite, or x lies outside the box, or,
-            where it was not asked for, between the levels of a variable; if an `AskedTrial` has been told before; if y
-            is missing, not finite or not a number; if a failed trial comes with a value; if an output is missing,
-            unknown or not finite. Nothing told before is lost.
+            where it was not asked for, between the levels of a variable; if an `AskedTrial` has been told before, or is
+            another optimizer's; if y is missing, not finite or not a number; if a failed trial comes with a value; if
+            an output is missing, unknown or not finite. Nothing told before is lost.
         """
         if failed and self.outcome == "success":  # what a failed trial does not say was not measured
             constraints = {limit.name: None for limit in self.limits} | dict(constraints or {})

@@ -5,11 +5,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.defaults import ROUNDED
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.variables import Number
 
-__all__ = ["check_levels", "initial_inputs", "trial_input", "trial_inputs"]
+__all__ = ["check_levels", "check_place", "initial_inputs", "trial_input", "trial_inputs"]
 
 # A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
 # it stay finite.
@@ -59,6 +60,21 @@ def check_levels(box: Box, name: str, x: Any) -> None:
                 f"{variable.step:g}. Tell the level that was commanded, and, where it went astray, "
                 "tell(x, y, reached=...)."
             )
+
+
+def check_place(box: Box, number: int, x: NDArray[np.float64], place: NDArray[np.float64]) -> None:
+    """Raise InputError where a trial of this number, handed over with its x (d,), is another one than that at `place`.
+
+    Every optimizer numbers from 0. Within `ROUNDED` of the place x may have been stored with fewer digits.
+    """
+    points = np.asarray(x)
+    fits = points.shape == place.shape
+    if not fits or not np.all(np.abs(box.to_unit(points) - place) <= ROUNDED):
+        shown = box.as_dict(points) if fits else points.tolist()
+        raise InputError(
+            f"trial {number} at {shown} was forgotten, or belongs to another optimizer: here trial {number} is at "
+            f"{box.as_dict(box.from_unit(place))}. Tell the optimizer that asked for it, or tell(x, y) by the place."
+        )
 
 
 def _near(box: Box, points: NDArray[np.float64]) -> NDArray[np.float64]:

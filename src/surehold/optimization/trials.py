@@ -18,7 +18,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.limits import Limit, checked_outputs
 from surehold.optimization.stored_trials import checked_columns
-from surehold.optimization.trial_inputs import check_levels, trial_input, trial_inputs
+from surehold.optimization.trial_inputs import check_levels, check_place, trial_input, trial_inputs
 from surehold.optimization.values import (
     number_of,
     outliers_among,
@@ -228,7 +228,9 @@ class Trials:
     def _place_of(self, x: Any) -> NDArray[np.float64]:
         """Return the place in the cube of x, which may have been told."""
         if isinstance(x, AskedTrial) and x.number in self._numbers:
-            return self._commanded[self._numbers.index(x.number)]
+            place = self._commanded[self._numbers.index(x.number)]
+            check_place(self._box, x.number, x.x, place)
+            return place
         return self._commanded_by(x)[1]
 
     def _take_shares(self) -> None:
@@ -351,6 +353,7 @@ class Trials:
             raise InputError(
                 f"trial {trial.number} is not pending: it has been told or forgotten, or belongs to another optimizer."
             )
+        check_place(self._box, trial.number, trial.x, self._pending[trial.number])
         return trial.number
 
     def _waiting(self, u: NDArray[np.float64]) -> int | None:
