@@ -51,6 +51,22 @@ def test_beyond_rounding_is_outside():
         Optimizer(far).tell([1e6 + 1.05], 1.0)
 
 
+def test_a_message_names_the_point_that_was_given():
+    for bounds, value in (((1.0, 5.0, "log"), 7.0), ((0, 5, "int"), 9), ((0.0, 1.0, "step=0.25"), 1.5)):
+        box = Box({"k": bounds})
+        shown = rf"\{{'k': {value}\}}"
+        with pytest.raises(InputError, match=rf"x = {shown} lies outside"):
+            Optimizer(box).tell({"k": value}, 1.0)
+        with pytest.raises(InputError, match=rf"x = {shown} is not pending"):
+            Optimizer(box).forget({"k": value})
+        with pytest.raises(InputError, match=rf"initial_points holds {shown}, which is not inside"):
+            Optimizer(box, initial_points=[{"k": value}])
+    with pytest.raises(InputError, match=r"x = \{'k': inf, 'grip': 'b'\} lies outside"):
+        Optimizer(Box({"k": (1.0, 5.0, "log"), "grip": ["a", "b"]})).tell([1e6, 0.0, 1.0], 1.0)
+    with pytest.raises(InputError, match=r"X holds \{'n': nan\}"):
+        Optimizer(Box({"n": (0, 5, "int")})).restore([[np.nan]], [1.0])
+
+
 def test_a_rounded_trial_is_the_one_that_was_asked():
     box = Box({"temperature": (20.0, 120.0), "time": (0.5, 10.0)})
     exact, rounded = Optimizer(box, n_initial=10), Optimizer(box, n_initial=10)

@@ -155,6 +155,25 @@ class Box:
             )
         return found
 
+    def as_given(self, x: Any) -> dict[str, Any]:
+        """Return one point (d,) as `{name: value}`, numbers as they are: what a message says of a bad point.
+
+        To 12 digits, so that a logarithm shows the number that it was made of.
+        """
+        x = self.points(x)
+        if self.plain:
+            return self.as_dict(x)
+        found: dict[str, Any] = {}
+        for variable in self.variables:
+            own = x[self._columns[variable.name]]
+            if isinstance(variable, Choice):
+                found[variable.name] = variable.choices[int(np.argmax(own))]
+                continue
+            with np.errstate(over="ignore"):
+                value = float(f"{variable.from_coordinate(own)[0]:.12g}")
+            found[variable.name] = int(value) if variable.integer and value.is_integer() else value
+        return found
+
     def encode(self, rows: Sequence[Mapping[str, Any]]) -> NDArray[np.float64]:
         """Return the points (n, d) for n dictionaries {name: value}; numbers may lie outside of their ranges.
 

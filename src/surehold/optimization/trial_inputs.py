@@ -30,7 +30,7 @@ def trial_inputs(box: Box, name: str, X: ArrayLike, inside: bool) -> NDArray[np.
     if not sound.all():
         bad = points[int(np.argmin(sound))]
         wanted = f"not inside {box}" if inside else "not finite"
-        raise InputError(f"{name} holds {box.as_dict(bad)}, which is {wanted}.")
+        raise InputError(f"{name} holds {box.as_given(bad)}, which is {wanted}.")
     return U
 
 
@@ -70,7 +70,7 @@ def check_place(box: Box, number: int, x: NDArray[np.float64], place: NDArray[np
     points = np.asarray(x)
     fits = points.shape == place.shape
     if not fits or not np.all(np.abs(box.to_unit(points) - place) <= ROUNDED):
-        shown = box.as_dict(points) if fits else points.tolist()
+        shown = box.as_given(points) if fits else points.tolist()
         raise InputError(
             f"trial {number} at {shown} was forgotten, or belongs to another optimizer: here trial {number} is at "
             f"{box.as_dict(box.from_unit(place))}. Tell the optimizer that asked for it, or tell(x, y) by the place."

@@ -325,7 +325,7 @@ class Trials:
         """Drop the pending trial at x (d,), or an `AskedTrial`; raises InputError if there is none."""
         number = self._numbered(x) if isinstance(x, AskedTrial) else self._waiting(self._box.to_unit(x))
         if number is None:
-            raise InputError(f"x = {self._box.as_dict(x)} is not pending; see Optimizer.pending.")
+            raise InputError(f"x = {self._box.as_given(x)} is not pending; see Optimizer.pending.")
         del self._pending[number]
 
     # --- which trial, and where ---------------------------------------------------------------------------------------
@@ -343,7 +343,7 @@ class Trials:
             return number, u, u
         if number is None:
             raise InputError(
-                f"x = {self._box.as_dict(x)} lies outside {self._box}; tell a point inside the box, or, where a trial "
+                f"x = {self._box.as_given(x)} lies outside {self._box}; tell a point inside the box, or, where a trial "
                 "was commanded inside and went astray, tell(x, y, reached=...)."
             )
         return number, self._pending[number], u  # rounded beyond the border
