@@ -117,7 +117,7 @@ def smooth(seed):
     else:
         speeds, phases, bends = rng.uniform(5.0, 25.0, d), rng.uniform(0.0, 6.0, d), rng.uniform(0.0, 9.0, d)
         drawn = lambda x: np.cos(x * speeds + phases).sum(axis=1) - (x - 0.5) ** 2 @ bends + 0.3 * np.cos(x @ speeds)  # noqa: E731
-    return drawn, sh.Box.unit(d), noise, Risk(name, beta=beta)
+    return drawn, sh.Box.unit(d), noise, Risk(name, beta=beta) if name == "mean-variance" else Risk(name)
 
 
 def lost_on_smooth(seed):

@@ -7,6 +7,7 @@ from surehold.campaigns.methods import METHODS, build_method
 from surehold.campaigns.peers import PEERS, REQUIRES, installed_peers
 from surehold.campaigns.plan import MethodSetup, Plan, ProblemSetup
 from surehold.errors import InputError
+from surehold.optimization.acquisition.risk_measures import Risk
 
 
 def hill(u):
@@ -48,6 +49,16 @@ def test_robust_methods_are_told_where_the_problem_clips_its_inputs(function, bo
         "p", "t", {"a": ProblemSetup(function, 9, 6, input_noise="own")}, {"m": MethodSetup("surehold", True, told)}
     )
     assert build_method(plan.cells()[0], 2, np.full((1, 2), 0.5), 0)._optimizer._ranking.accurate.border == "keep"
+
+
+@pytest.mark.parametrize(
+    ("told", "risk"),
+    [({}, Risk("mean-variance", beta=0.5)), ({"risk": "mean"}, Risk()), ({"risk": "cvar"}, Risk("cvar"))],
+)
+def test_parameters_of_a_problems_measure_are_not_of_a_methods_own(told, risk):
+    problems = {"a": ProblemSetup("qing-branin", 9, 6, input_noise="own")}
+    plan = Plan("p", "t", problems, {"m": MethodSetup("surehold", True, told)})
+    assert build_method(plan.cells()[0], 2, np.full((1, 2), 0.5), 0)._optimizer.risk == risk
 
 
 def test_a_trust_region_that_became_too_small_begins_anew():

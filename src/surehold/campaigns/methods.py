@@ -112,7 +112,8 @@ def build_method(cell: Cell, dimension: int, initial: NDArray[np.float64], seed:
     clips = asked is not None and getattr(asked.function, "clips", False)
     if cell.by.optimizer == "surehold":
         stated = {"border": "clip"} if clips else {}
-        if asked is not None and asked.risk != "mean":
+        own = told["settings"].get("risk")
+        if asked is not None and asked.risk != "mean" and own in (None, asked.risk):  # parameters are of the measure
             stated |= {name: getattr(asked, name) for name in ("risk", "alpha", "beta")}
         return Surehold(dimension, initial, seed, noise, {**stated, **told["settings"]})
     if cell.by.optimizer in EMBEDDED:

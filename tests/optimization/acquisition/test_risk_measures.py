@@ -28,6 +28,13 @@ def weights_for(draws, seed):
     return weights / weights.sum()
 
 
+def risk_of(name, alpha=0.1, beta=1.0):
+    """Return the measure with that of the two parameters which it takes."""
+    if name.startswith("mean-"):
+        return Risk(name, beta=beta)
+    return Risk(name, alpha=alpha) if name in ("var", "cvar") else Risk(name)
+
+
 def linear(X):
     return X @ SLOPE + 0.3
 
@@ -120,7 +127,7 @@ def test_normal_outcomes(alpha):
     }
     assert set(expected) == set(RISKS)
     for name, value in expected.items():
-        assert Risk(name, alpha, beta=1.5).measure(draws, weights) == pytest.approx(value, abs=1e-4), name
+        assert risk_of(name, alpha, 1.5).measure(draws, weights) == pytest.approx(value, abs=1e-4), name
 
 
 @settings(max_examples=60, deadline=None)
@@ -151,15 +158,15 @@ def test_value_at_risk_is_the_weighted_quantile(draws, alpha, seed):
 def test_order_and_symmetries(draws, alpha, seed):
     weights = weights_for(draws, seed)
     order = np.random.default_rng(seed).permutation(len(draws))
-    found = {name: float(Risk(name, alpha).measure(draws, weights)) for name in RISKS}
+    found = {name: float(risk_of(name, alpha).measure(draws, weights)) for name in RISKS}
     near = 1e-9 * (1.0 + np.abs(draws).max())
     assert found["worst"] <= found["cvar"] + near
     assert found["cvar"] <= min(found["var"], found["mean"]) + near
     assert found["mean-std"] <= found["mean"] + near
     for name, value in found.items():
-        risk = Risk(name, alpha, beta=1.0 / 3.0 if name == "mean-variance" else 1.0)  # variances grow by 9
+        risk = risk_of(name, alpha, 1.0 / 3.0 if name == "mean-variance" else 1.0)  # variances grow by 9
         assert risk.measure(3.0 * draws - 2.0, weights) == pytest.approx(3.0 * value - 2.0, abs=1e-5), name
-        assert Risk(name, alpha).measure(draws[order], weights[order]) == pytest.approx(value, abs=1e-6), name
+        assert risk_of(name, alpha).measure(draws[order], weights[order]) == pytest.approx(value, abs=1e-6), name
 
 
 def test_limits_of_the_share_that_counts():
@@ -172,9 +179,9 @@ def test_limits_of_the_share_that_counts():
 @pytest.mark.parametrize("name", RISKS)
 def test_many_draws_at_once_are_measured_one_by_one(name):
     draws, weights = RNG.normal(size=(3, 4, 9)), weights_for(np.empty(9), 0)
-    found = Risk(name, 0.3).measure(draws, weights)
+    found = risk_of(name, 0.3).measure(draws, weights)
     assert found.shape == (3, 4)
-    each = [[Risk(name, 0.3).measure(row, weights) for row in rows] for rows in draws]
+    each = [[risk_of(name, 0.3).measure(row, weights) for row in rows] for rows in draws]
     np.testing.assert_allclose(found, each, atol=1e-12)
 
 
@@ -189,6 +196,12 @@ def test_many_draws_at_once_are_measured_one_by_one(name):
         ({"name": "mean-std", "beta": float("inf")}, "finite"),
         ({"name": "cvar", "alpha": "x"}, "alpha is 'x'; give a number"),
         ({"name": "mean-std", "beta": None}, "beta is None; give a number"),
+        ({"name": "cvar", "beta": 5}, "beta is 5, but risk 'cvar' takes alpha alone"),
+        ({"name": "mean-std", "alpha": 0.2}, "alpha is 0.2, but risk 'mean-std' takes beta alone"),
+        ({"name": "worst", "alpha": 0.2}, "risk 'worst' takes no parameter"),
+        ({"name": "cvar=0.2"}, r"give surehold.Risk\('cvar', alpha=0.2\)"),
+        ({"name": "mean-std=2"}, r"give surehold.Risk\('mean-std', beta=2\)"),
+        ({"name": "worst=2"}, "did you mean 'worst'"),
     ],
 )
 def test_bad_input(arguments, message):
@@ -227,7 +240,7 @@ def test_linear_function_under_normal_noise(known, alpha):
     }
     moments, _ = perturbations.spread(known, U)
     for name, lack in expected.items():
-        found = Risk(name, alpha, beta=2.0).measure(moments.mean, perturbations.quadrature.weights)
+        found = risk_of(name, alpha, 2.0).measure(moments.mean, perturbations.quadrature.weights)
         assert found == pytest.approx(np.full(len(found), linear(U)[0] + lack), abs=0.01 * spread), name
 
 
@@ -248,7 +261,7 @@ def test_linear_function_under_uniform_noise(known, alpha):
     moments, _ = perturbations.spread(known, U)
     values = moments.mean.reshape(len(moments.mean), 2, -1)
     for name, lack in expected.items():
-        found = Risk(name, alpha).measure(values, perturbations.quadrature.weights)
+        found = risk_of(name, alpha).measure(values, perturbations.quadrature.weights)
         np.testing.assert_allclose(found, np.tile(linear(U) + lack, (len(found), 1)), atol=0.005 * h, err_msg=name)
 
 
@@ -331,7 +344,7 @@ def test_the_correction_of_few_perturbations_against_closed_forms(name):
         / 0.1,
     }[name]
     few, many = (Perturbations(quasi_monte_carlo(np.array([[s**2]]), exponent)) for exponent in (4, 12))
-    alone = RiskImprovement(sure, few, Risk(name, 0.1, beta=2.0), None, np.random.default_rng(0))
+    alone = RiskImprovement(sure, few, risk_of(name, beta=2.0), None, np.random.default_rng(0))
     off = np.abs(alone.expectation(U) - exactly)
     left = np.abs(alone.corrected(many).expectation(U) - exactly)
     assert np.all(left < 1e-2 * spread)
@@ -342,7 +355,7 @@ def test_the_correction_of_few_perturbations_against_closed_forms(name):
 def test_the_correction_of_an_unsure_model_against_joint_draws_at_all_points(unsure, name):
     """It comes nearer to what 256 perturbations give with as many normal variables, on average over the box."""
     few, many = (Perturbations(quasi_monte_carlo(S, exponent)) for exponent in (3, 8))
-    U, risk, rng = np.random.default_rng(3).random((25, 2)), Risk(name, beta=2.0), np.random.default_rng
+    U, risk, rng = np.random.default_rng(3).random((25, 2)), risk_of(name, beta=2.0), np.random.default_rng
     drawn, alone = (many_values(unsure, points, risk, U, 40).mean(axis=0) for points in (many, few))
     corrected = [RiskImprovement(unsure, few, risk, None, rng(k)).corrected(many).expectation(U) for k in range(40)]
     left, off = (np.abs(values - drawn).mean() for values in (np.mean(corrected, axis=0), alone))

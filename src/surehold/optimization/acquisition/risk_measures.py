@@ -45,7 +45,7 @@ class Risk:
 
     def __post_init__(self) -> None:
         if self.name not in RISKS:
-            raise unknown_name("risk", self.name, RISKS)
+            raise self._unknown()
         for name, value in (("alpha", self.alpha), ("beta", self.beta)):
             if isinstance(value, bool) or not isinstance(value, Real):
                 raise InputError(f"{name} is {value!r}; give a number.")
@@ -55,6 +55,21 @@ class Risk:
             raise InputError(
                 f"beta is {self.beta!r}; give a finite number of standard deviations or variances, 0 or more."
             )
+        own = _PARAMETERS.get(self.name)
+        for name, value, usual in (("alpha", self.alpha, Risk.alpha), ("beta", self.beta, Risk.beta)):
+            if name != own and value != usual:
+                takes = "no parameter" if own is None else f"{own} alone"
+                raise InputError(f"{name} is {value!r}, but risk '{self.name}' takes {takes}; leave it out.")
+
+    def _unknown(self) -> InputError:
+        """Return the error for a name that is none; of the command line's form, "cvar=0.1", it names that of Python."""
+        name, _, value = str(self.name).partition("=")
+        if name in _PARAMETERS:
+            return InputError(
+                f"risk {self.name!r} is how the command line says it; give "
+                f"surehold.Risk({name!r}, {_PARAMETERS[name]}={value})."
+            )
+        return unknown_name("risk", self.name, RISKS)
 
     @classmethod
     def parse(cls, text: str) -> "Risk":
