@@ -342,6 +342,20 @@ def test_bad_settings(settings, words):
         Optimizer(BOX, **settings)
 
 
+@pytest.mark.parametrize("run", [maximize, minimize])
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"n_intial": 3}, "setting 'n_intial' is unknown; did you mean 'n_initial'"),
+        ({"n_job": 2}, "did you mean 'n_jobs'"),
+        ({"settings": {"seed": 1}}, "setting 'settings' is unknown"),
+    ],
+)
+def test_a_misspelt_setting_is_named(run, settings, words):
+    with pytest.raises(InputError, match=words):
+        run(lambda x: 0.0, BOX, 6, **settings)
+
+
 # --- several processes ----------------------------------------------------------------------------------------------
 
 

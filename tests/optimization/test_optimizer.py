@@ -293,6 +293,8 @@ def test_a_surrogate_of_ones_own():
         ({"k": -2.0, "quadrature": "unscented", "input_noise": NOISE}, "above -2"),
         ({"border": "bounce", "input_noise": NOISE}, "border"),
         ({"kappa": np.nan}, "kappa"),
+        ({"k": np.nan}, "k is nan; with 2 coordinates it must be a finite number above -2"),
+        ({"k": -3.0}, "k is -3.0; with 2 coordinates"),
         ({"kappa": -1.0}, "0 or more"),
         ({"preset": "thesiss"}, "did you mean 'thesis'"),
         ({"input_noise": InputNoise({"a": 0.1})}, "nothing about b"),

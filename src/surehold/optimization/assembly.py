@@ -87,7 +87,7 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
         raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
     check_kinds(settings)
     s = SimpleNamespace(**settings)
-    _check(s)
+    _check(s, box.dimension)
     if s.outcome != "value":
         check_combination(settings)
     elif isinstance(s.surrogate, str) and s.surrogate in SUCCESS_SURROGATES:
@@ -199,7 +199,7 @@ def _turned(output_range: tuple[float, float] | None) -> tuple[float, float] | N
     return None if output_range is None else (-output_range[1], -output_range[0])
 
 
-def _check(s: SimpleNamespace) -> None:
+def _check(s: SimpleNamespace, d: int) -> None:
     for name, known in (
         ("direction", ("maximize", "minimize")),
         ("outcome", ("value", "success", "preference")),
@@ -215,6 +215,8 @@ def _check(s: SimpleNamespace) -> None:
         value = getattr(s, name)
         if value is not None and not 0 < value < 1:
             raise InputError(f"{name} is {value!r}; give a probability strictly between 0 and 1, such as 0.95.")
+    if not (np.isfinite(s.k) and d + s.k > 0.0):  # also where another rule than "unscented" leaves it unused
+        raise InputError(f"k is {s.k!r}; with {d} coordinates it must be a finite number above {-d}.")
     if s.kappa < 0.0:
         raise InputError(f"kappa is {s.kappa!r}; give standard deviations to be added, 0 or more.")
 

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from inspect import signature
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.amounts import amount
-from surehold.errors import InputError, SureholdError
+from surehold.errors import InputError, SureholdError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.evaluation import Evaluation, in_processes, one_by_one
 from surehold.optimization.limits import returned_outputs
@@ -297,6 +298,11 @@ def _count(name: str, value: int) -> int:
 def _optimizer(box: Box, n_trials: int, settings: dict[str, Any]) -> Optimizer:
     if settings.get("outcome") == "preference":
         raise InputError("a function gives no preferences; make an Optimizer, and tell_preference(better, worse).")
+    named = [name for function in (Optimizer, maximize) for name in signature(function).parameters]
+    known = [name for name in named if name not in ("f", "box", "settings")]
+    for name in settings:
+        if name not in known:
+            raise unknown_name("setting", name, known)
     optimizer = Optimizer(box, **settings)
     if settings.get("n_initial") is None and optimizer.n_initial > n_trials:
         fewer: dict[str, Any] = {**settings, "n_initial": n_trials}

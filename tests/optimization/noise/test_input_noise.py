@@ -161,6 +161,15 @@ def test_noise_proportional_to_the_input_is_none_at_zero(bounds, shape):
     assert np.isfinite(optimizer.recommend().mean)
 
 
+def test_a_noise_function_that_raises_is_named_with_the_place():
+    def broken(x):
+        return {"dx": 0.001, "dy": [0.003][int(x[0] > 0.0)]}
+
+    with pytest.raises(InputError, match=r"raised IndexError at \{'dx': 0.02, 'dy': 0.01\}: list index") as caught:
+        InputNoise.varying(broken).unit_covariance(HAND, np.array([0.02, 0.01]))
+    assert isinstance(caught.value.__cause__, IndexError)
+
+
 def test_a_negative_deviation_is_refused_where_it_is():
     noise = InputNoise.varying(lambda x: 0.05 * x)
     with pytest.raises(InputError, match=r"nonsense at .*dose.*-2.*0 or more"):

@@ -45,7 +45,13 @@ class Varying:
 
     def _at(self, x: NDArray[np.float64], box: Box) -> Independent | Correlated:
         """Return the noise that the user's function states at x (d,), checked."""
-        stated = self.function(x)
+        try:
+            stated = self.function(x)
+        except Exception as error:
+            raise InputError(
+                f"the input-noise function raised {type(error).__name__} at {box.as_dict(x)}: {error}. Mend it; it is "
+                "asked everywhere in the box."
+            ) from error
         try:
             if isinstance(stated, Mapping):
                 return Independent(checked_deviations(stated))
