@@ -250,7 +250,7 @@ def test_the_bumped_bowl_in_polar_coordinates():
 
 
 def test_the_worst_within_a_distance_of_the_polynomial():
-    """StableOpt's problem, of which brute force on the whole disc finds -4.28 at (-.181, .292)."""
+    """StableOpt's problem, judged at 32 points of the disc: on the whole of it half a percent is lost."""
     problem = robust_problem("stableopt-polynomial")
     radii, turns = np.meshgrid(np.linspace(0.0, 0.5, 11), np.linspace(0.0, 2.0 * np.pi, 361))
     disc = np.column_stack([(radii * np.cos(turns)).ravel(), (radii * np.sin(turns)).ravel()])
@@ -260,7 +260,10 @@ def test_the_worst_within_a_distance_of_the_polynomial():
 
     assert problem.optimum.x == pytest.approx([-0.181, 0.292], abs=5e-4)
     assert problem.value(problem.optimum.x)[0] == pytest.approx(problem.optimum.value, abs=1e-5)
-    assert asked(problem.optimum.x) == pytest.approx(-4.28, abs=0.01)
+    assert asked(problem.optimum.x) == pytest.approx(-4.2871, abs=1e-4)
+    climb = minimize(lambda x: -asked(x), problem.optimum.x, method="Nelder-Mead", options={"xatol": 1e-6})
+    assert -climb.fun == pytest.approx(-4.2828, abs=1e-4)
+    assert climb.x == pytest.approx([-0.1813, 0.2916], abs=2e-4)
     around = [(-0.1, 0.3), (-0.25, 0.3), (-0.18, 0.2), (-0.18, 0.4), (0.4, 0.6), (2.5, 4.0)]
     for place in around:
         assert problem.value(np.array(place))[0] == pytest.approx(asked(np.array(place)), abs=0.05 * abs(asked(place)))

@@ -4,7 +4,7 @@
     airbo-     Cao et al. 2023, AIRBO: the same
     mvar-      Daulton et al. 2022, robust multi-objective optimization: its first objective alone, value at risk
     qing-      Qing et al. 2022, mean-variance optimization by Fourier features: mean - beta variance
-    stableopt- Bogunovic et al. 2018, StableOpt: the worst outcome within a distance
+    stableopt- Bogunovic et al. 2018, StableOpt: the worst outcome within a distance, judged at 32 points
     rahbo-     Makarova et al. 2021, RAHBO: exact inputs, mean - beta variance of the observations
 
 Input noise carries inputs outside the box; the functions go on there, but for the polynomial of Bertsimas et al. 2010,
@@ -113,8 +113,13 @@ def _nes_polynomial() -> RobustProblem:
 
 
 def _stableopt_polynomial() -> RobustProblem:
+    """Return the polynomial whose worst value within .5 counts, judged at 31 points of the rim and the center.
+
+    Of a disc the worst lies on the rim but for valleys. By the whole disc the best value is -4.2828, half a percent
+    lower, at (-.1813, .2916); at the best place by the 32 points, .0007 from there, it is -4.2871.
+    """
     box = Box({"x1": (-0.95, 3.2), "x2": (-0.45, 4.4)})
-    turns = np.linspace(0.0, 2.0 * np.pi, 31, endpoint=False)  # of a disc the worst lies on the rim but for valleys
+    turns = np.linspace(0.0, 2.0 * np.pi, 31, endpoint=False)
     errors = 0.5 * np.vstack([np.column_stack([np.cos(turns), np.sin(turns)]), np.zeros(2)])
     return RobustProblem(Formula("stableopt-polynomial", box, polynomial), InputNoise.samples(errors), risk="worst")
 
