@@ -51,7 +51,8 @@ stored = json.loads(STORED.read_text()) if STORED.exists() else {}
 def test_runs_choose_the_same_inputs(name):
     """To 1e-4 of the box, whose sides and the spread of whose values are about 1.
 
-    The quantile at the end of "inferred noise" was recorded anew when it came to contain the observation noise.
+    Recorded anew were the quantile at the end of "inferred noise", when it came to contain the observation noise, and
+    "cvar", when where an ascent ends came not to depend on the unit of the values.
     """
     np.testing.assert_allclose(same_results.run(name, RUNS[name]), stored["runs"][name], rtol=0.0, atol=1e-4)
 
