@@ -57,6 +57,20 @@ def test_pose_algebra_equals_scipy():
     np.testing.assert_allclose(half_turn.quaternion, [0, 0, 1, 0], atol=1e-12)
 
 
+@pytest.mark.parametrize("size", [0.0, 1e-200, 1e-120, 1e200, float("nan"), float("inf")])
+def test_a_pose_is_finite_where_its_rotation_is(size):
+    pose = Pose((0.1, 0.2, 0.3), (0.0, 0.0, 0.0, size))
+    assert not pose.is_finite
+    assert not np.isfinite(pose.rotation).any()
+
+
+def test_a_quaternion_of_another_length_is_a_rotation():
+    for size in (1e-90, 0.5, 3.0, 1e150):
+        pose = Pose((0.0, 0.0, 0.0), (size, -size, size, size))
+        assert pose.is_finite
+        np.testing.assert_allclose(pose.rotation, Pose(quaternion=(0.5, -0.5, 0.5, 0.5)).rotation, atol=1e-15)
+
+
 def test_bad_modes_and_matrices_are_explained():
     hand, mug = icub_left_hand(), shipped_object("mug")
     with pytest.raises(InputError, match="did you mean 'right'"):

@@ -8,7 +8,17 @@ from scipy.spatial.transform import Rotation
 
 import surehold
 from surehold.errors import InputError
-from surehold.grasping import OBJECTS, STATUSES, Pose, Simulator, default_pose, grasp_scene, wrench_quality
+from surehold.grasping import (
+    OBJECTS,
+    STATUSES,
+    Pose,
+    Simulator,
+    default_pose,
+    grasp_batch,
+    grasp_scene,
+    robust_quality,
+    wrench_quality,
+)
 
 
 @pytest.fixture(scope="module")
@@ -155,11 +165,47 @@ def test_bad_options_are_explained(options, words):
         Simulator(**options)
 
 
-def test_poses_that_are_not_finite_are_refused(simulator):
-    with pytest.raises(InputError, match="finite"):
-        simulator.grasp(Pose((float("nan"), 0.0, 0.0)))
-    with pytest.raises(InputError, match="finite"):
+BAD_POSES = {
+    "NaN": (Pose((float("nan"), 0.0, 0.0)), "is not finite"),
+    "zero quaternion": (Pose((0.2, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), "quaternion has no length"),
+    "hardly a quaternion": (Pose((0.2, 0.0, 0.0), (0.0, 0.0, 0.0, 1e-200)), "quaternion has no length"),
+    "beyond all rounding": (Pose((1e15, 0.0, 0.0)), "in meters"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_POSES)
+def test_poses_that_compiled_code_cannot_take_are_refused_by_all_that_take_one(simulator, name):
+    pose, words = BAD_POSES[name]
+    still = np.zeros((5, 4))
+    with pytest.raises(InputError, match=words):
+        simulator.grasp(pose)
+    for at_rest in (simulator.quality_at, simulator.contacts_at, simulator.gaps):
+        with pytest.raises(InputError, match=words):
+            at_rest(pose, still)
+    with pytest.raises(InputError, match=words):
+        robust_quality(simulator, pose, n=2)
+    with pytest.raises(InputError, match=words):
+        Simulator(obj="mug", object_pose=pose)
+    with pytest.raises(InputError, match=r"finite|in meters"):
+        grasp_batch(simulator, [Pose(), pose])
+
+
+def test_postures_that_are_not_finite_are_refused(simulator):
+    with pytest.raises(InputError, match="s1 is inf"):
         simulator.grasp(Pose(), float("inf"))
+
+
+def test_joints_of_another_hand_and_without_value_are_refused(simulator):
+    unknown = np.zeros((5, 4))
+    unknown[1, 2] = np.nan
+    name = simulator.hand.joint_names[6]
+    for at_rest in (simulator.quality_at, simulator.contacts_at, simulator.gaps):
+        with pytest.raises(InputError, match=r"shape \(2, 4\); give \(5, 4\)"):
+            at_rest(pose_of(simulator), np.zeros((2, 4)))
+        with pytest.raises(InputError, match=f"joint {name} is nan"):
+            at_rest(pose_of(simulator), unknown)
+        with pytest.raises(InputError, match="is 1e\\+300"):
+            at_rest(pose_of(simulator), np.full((5, 4), 1e300))
 
 
 def test_a_trial_calls_few_python_functions_of_its_own(simulator):

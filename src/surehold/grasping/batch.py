@@ -20,7 +20,7 @@ from surehold.amounts import amount
 from surehold.errors import InputError
 from surehold.grasping.grasp import STATUSES
 from surehold.grasping.hand.synergy import preshape_of
-from surehold.grasping.poses import Pose, check_rotations
+from surehold.grasping.poses import FARTHEST, Pose, check_rotations
 from surehold.grasping.simulator import Simulator
 from surehold.grasping.trial_loop import UNDECIDED, run_trials
 from surehold.grasping.wrench.ellipsoids import RoundCones
@@ -118,6 +118,9 @@ def _compiled_outcomes(
     if not (np.isfinite(matrices).all() and np.isfinite(postures).all()):
         raise InputError("a pose or posture of the batch is not finite; give finite numbers.")
     check_rotations(matrices[:, :, :3])
+    farthest = float(np.abs(matrices[:, :, 3]).max(initial=0.0))
+    if farthest > FARTHEST:
+        raise InputError(f"a pose of the batch is {farthest:g} m away; give positions in meters, up to {FARTHEST:g}.")
     chosen = preshape_of(simulator.hand, simulator.preshape)
     first, *others = postures.T if postures.ndim > 1 else (postures,)
     starts = chosen.start + first[:, None, None] * chosen.posture

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.grasping.batch import grasp_batch
 from surehold.grasping.grasp import STATUSES
-from surehold.grasping.poses import Pose
+from surehold.grasping.poses import Pose, check_pose
 from surehold.grasping.simulator import Simulator
 
 __all__ = ["DISTURBED", "PoseNoise", "RobustQuality", "disturbed_poses", "robust_quality"]
@@ -129,8 +129,7 @@ def disturbed_poses(
         raise InputError(f"number of disturbed trials is {n!r}; give an integer of 1 to {_MOST:,}.")
     if disturbed not in DISTURBED:
         raise unknown_name("disturbed body", disturbed, DISTURBED)
-    if not pose.is_finite:
-        raise InputError(f"pose {pose} is not finite; give finite numbers.")
+    check_pose(pose)
     bounds = noise or PoseNoise()
     if not all(np.isfinite(b) and b >= 0.0 for b in bounds):
         raise InputError(f"pose noise is {bounds}; give bounds of 0 or more, in meters and radians.")

@@ -11,7 +11,7 @@ grasp center, R = R_default Rx Ry Rz.
 """
 
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 from typing import Final
 
 import numpy as np
@@ -21,10 +21,12 @@ from surehold.errors import InputError, unknown_name
 from surehold.grasping.hand.model import Hand
 from surehold.grasping.object.model import GraspObject
 
-__all__ = ["FACETS", "MODES", "Pose", "check_rotations", "default_pose"]
+__all__ = ["FACETS", "FARTHEST", "MODES", "Pose", "check_pose", "check_rotations", "default_pose"]
 
 Array = NDArray[np.float64]
 _EYE: Final = np.eye(3)
+_LEAST: Final = 1e-200  # squared length of a quaternion, below which rounding spoils its direction
+FARTHEST: Final = 1e9  #: largest coordinate of a pose [m]: beyond, rounding is as large as what a touch is found to
 
 _NORMALS: Final = {
     "right": (1.0, 0.0, 0.0),
@@ -63,16 +65,16 @@ class Pose:
 
     @property
     def is_finite(self) -> bool:
-        """Whether all seven numbers are finite."""
-        return all(map(isfinite, (*self.position, *self.quaternion)))
+        """Whether position and rotation are finite: a quaternion without length has no rotation."""
+        return all(map(isfinite, self.position)) and _LEAST < self._squared < inf
 
     @property
     def rotation(self) -> Array:
         """R (3, 3)."""
         w, x, y, z = map(float, self.quaternion)
-        length = sqrt(w * w + x * x + y * y + z * z)
-        if not length > 0.0:
+        if not _LEAST < self._squared < inf:
             return np.full((3, 3), np.nan)
+        length = sqrt(self._squared)
         w, x, y, z = w / length, x / length, y / length, z / length
         return np.array(
             [
@@ -81,6 +83,11 @@ class Pose:
                 [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
             ]
         )
+
+    @property
+    def _squared(self) -> float:
+        w, x, y, z = map(float, self.quaternion)
+        return w * w + x * x + y * y + z * z
 
     @property
     def matrix(self) -> Array:
@@ -144,6 +151,17 @@ def facet_axes(mode: str) -> Array:
         raise unknown_name("facet and thumb direction", mode, neighbors)
     z, x = -np.array(_NORMALS[facet]), -np.array(_NORMALS[thumb])
     return np.column_stack([x, np.cross(z, x), z])
+
+
+def check_pose(pose: Pose, name: str = "pose") -> None:
+    """Raise InputError unless compiled code can take a pose: what is not finite it would read and write anywhere."""
+    if not pose.is_finite:
+        raise InputError(
+            f"{name} {pose} is not finite, or its quaternion has no length; give finite numbers and a quaternion of "
+            "length 1, such as (1, 0, 0, 0)."
+        )
+    if max(map(abs, pose.position)) > FARTHEST:
+        raise InputError(f"{name} {pose} is more than {FARTHEST:g} m away; give its position in meters.")
 
 
 def check_rotations(matrices: Array) -> None:

@@ -16,7 +16,7 @@ from surehold.grasping.hand.synergy import closing_motion, preshape_of
 from surehold.grasping.object.distance_field import MARGIN, DistanceField, distance_field_of
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.shipped import shipped_object
-from surehold.grasping.poses import Pose
+from surehold.grasping.poses import FARTHEST, Pose, check_pose
 from surehold.grasping.wrench.quality import Measure
 from surehold.store.uninterrupted import uninterrupted
 
@@ -123,8 +123,7 @@ class Simulator:
             raise InputError(f"depth of the soft touch is {depth!r} m; give a length above 0 and up to 0.008 m.")
         self.depth: Final[float] = float(depth)
         self.object_pose: Final[Pose] = Pose() if object_pose is None else object_pose
-        if not self.object_pose.is_finite:
-            raise InputError(f"object_pose {object_pose} is not finite; give finite numbers.")
+        check_pose(self.object_pose, "object_pose")
         self._to_object: Final[Pose] = self.object_pose.inverse()
         self.to_object: Final[Array] = self._to_object.matrix  #: (3, 4) from the world to the object's frame
         self.field: Final[DistanceField] = self._field()
@@ -142,14 +141,15 @@ class Simulator:
         Raises
         ------
         InputError
-            If the pose or s1 is not finite.
+            If the pose or s1 is not finite, or the pose's quaternion is zero.
         """
-        if not (np.all(np.isfinite(s1)) and pose.is_finite):
-            raise InputError(f"pose {pose} with s1 = {s1!r} is not finite; give finite numbers.")
+        check_pose(pose)
+        if not np.all(np.isfinite(s1)):
+            raise InputError(f"s1 is {s1!r}; give finite numbers [rad].")
         relative = self._to_object @ pose if self.object_pose != Pose() else pose
         start = self.motion_start(s1)
         opened = np.clip(start, self.hand.lower, self.hand.upper)
-        tried = self.attempt(pose, start)
+        tried = self._attempt(pose, start)
         if tried.deepest > 0.0:
             worth = self.collision_worth(tried.deep)
             return Grasp("initial collision", worth, relative, s1, opened, opened, self._no_contacts, (), tried.deepest)
@@ -170,17 +170,23 @@ class Simulator:
 
         `pose` is from the palm frame to the object's frame, `joints` (f, j) [rad or m]; fewer than two contacts count
         as in `grasp`.
+
+        Raises
+        ------
+        InputError
+            If pose or joints are not finite, the quaternion is zero, or the joints have another shape.
         """
         contacts = self.contacts_at(pose, joints)
         if len(contacts) < 2:
-            gaps = self.gaps(pose, np.asarray(joints, dtype=np.float64))[:-1].reshape(self.hand.radii.shape)
+            gaps = self.gaps(pose, joints)[:-1].reshape(self.hand.radii.shape)
             return self.measure.without_contacts(gaps)
         wrench = self.measure.wrench(contacts.points, contacts.normals, contacts.weights)
         return float(self.measure.value(contacts.points, contacts.normals, wrench))
 
     def contacts_at(self, pose: Pose, joints: ArrayLike) -> Contacts:
         """Return the skin's contacts of the hand as it stands, see `quality_at`."""
-        angles = np.array(joints, dtype=np.float64, order="C")
+        check_pose(pose)
+        angles = self._angles(joints)
         rows = felt(
             self.field.nodes,
             self.field.frame,
@@ -205,21 +211,39 @@ class Simulator:
             From the palm frame to the object's frame.
         joints
             Joint angles or shifts, (f, j) [rad or m].
+
+        Raises
+        ------
+        InputError
+            As of `quality_at`.
         """
-        angles = np.array(joints, dtype=np.float64, order="C")
+        check_pose(pose)
+        angles = self._angles(joints)
         return open_gaps(self.field.nodes, self.field.frame, self.arrays, pose.matrix, angles)
 
     def warm_up(self) -> None:
         """Compile what a trial needs, if it is not yet in the cache: some seconds once for an installation."""
         half = self.object.box_half_extents
         beside = Pose((float(-self.hand.grasp_center[0]), 0.0, float(self.object.box_center[2] - half[2] - 0.05)))
-        tried = self.attempt(beside, self.motion_start(0.0))
+        tried = self._attempt(beside, self.motion_start(0.0))
         self.gaps(beside, tried.joints)
         self.contacts_at(beside, tried.joints)
         points = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
         self.measure.wrench(points, -points, np.ones(4))
 
-    def attempt(self, pose: Pose, start: Array) -> Attempt:
+    def _angles(self, joints: ArrayLike) -> Array:
+        """Return joints (f, j) as compiled code can take them: what is not finite it would read and write anywhere."""
+        angles = np.array(joints, dtype=np.float64, order="C")
+        shape = self.hand.radii.shape
+        if angles.shape != shape:
+            raise InputError(f"joints have shape {angles.shape}; give {shape}, fingers by joints, in the hand's order.")
+        bad = np.flatnonzero(~(np.abs(angles.ravel()) <= FARTHEST))
+        if len(bad):
+            name, value = self.hand.joint_names[bad[0]] or f"number {bad[0]}", angles.flat[bad[0]]
+            raise InputError(f"joint {name} is {value:g}; give finite angles [rad] or shifts [m], up to {FARTHEST:g}.")
+        return angles
+
+    def _attempt(self, pose: Pose, start: Array) -> Attempt:
         """Close the hand at a pose of its palm in the world, from a motion's start (f, j); see `grasp`."""
         return attempt(
             self.field.nodes,
