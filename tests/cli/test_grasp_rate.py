@@ -112,6 +112,15 @@ def test_a_name_in_brackets_is_shown_whole(block, capsys):
     assert "[bold]" in rated("held/grasps.yaml", capsys)
 
 
+def test_of_simox_the_friction_is_told_that_it_has(here, capsys):
+    line = "grasp mug --preset thesis-grasp --trials 3 --initial 3 --noise none --method bo --out thesis"
+    assert run(line.split()) == 0
+    text = rated("thesis/grasps.yaml", capsys)
+    assert "simox with single contacts and friction 1 in simox, 0.5 in force closure" in text
+    assert run(["grasp", "rate", "thesis/grasps.yaml", "--friction", "0.3"]) == 2
+    assert "friction is 0.3, but the quality 'simox'" in " ".join(capsys.readouterr().err.split())
+
+
 def test_rated_grasps_are_written_in_another_format(block, capsys):
     rated("held/grasps.yaml --out again --format graspgen", capsys)
     before, now = read_grasps(block / "grasps.yaml"), read_grasps(block.parent / "again" / "grasps.yaml")

@@ -34,6 +34,7 @@ def test_the_preset_of_the_thesis_grasps_as_the_thesis(here):
     settings = json.loads((here / "b" / "result.json").read_text())["settings"]
     assert (settings["contact"], settings["quality"], settings["closing"]) == ("single", "simox", "synergy")
     assert settings["preset"] == "thesis-grasp"
+    assert settings["friction"] == "1 in simox, 0.45 in force closure"
 
 
 def test_the_preset_of_another_problem_is_refused(here, capsys):

@@ -104,6 +104,8 @@ def test_no_exploration_replaces_another_and_one_that_cannot_start_leaves_nothin
         ("grasp mug --cloud bottle.npz", "both object 'mug' and a cloud"),
         ("grasp mug --camera 0,0,0", "camera is for point clouds"),
         ("grasp mug --shapes 4", "shapes is for point clouds"),
+        ("grasp mug --plan mean", "plan is for point clouds"),
+        ("explore mug --plan mean", "No such option: --plan"),
         ("explore mug --start view --prior box", "prior is for point clouds"),
         ("grasp --cloud bottle.xyz", "--unit mm"),
         ("grasp --cloud bottle.xyz --unit mm --camera 0,0", "three numbers"),

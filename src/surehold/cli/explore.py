@@ -3,6 +3,7 @@
 import json
 import webbrowser
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,7 +24,7 @@ _STARTS = ("box", "view")
 _MOST_TRIALS = 500
 
 
-@takes_grasp_options
+@partial(takes_grasp_options, without=("plan",))  # what is known to be unsure is touched, not averaged
 def explore(
     obj: Annotated[str, typer.Argument(metavar="[OBJECT]", help="mug, bottle, glass, drill, or a mesh file.")] = "",
     trials: Annotated[int, typer.Option(help="Touches.")] = 20,

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from surehold.cli.grasp_check import checked, checker_for
+from surehold.cli.grasp_check import checked, checker_for, friction_in_words
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
 from surehold.cli.grasp_rate import Formats
 from surehold.cli.options import (
@@ -145,6 +145,7 @@ def grasp(
         problem = described_grasp(described, body, progress)
     described["facet"] = problem.facet
     checker = checker_for(problem, check, outcome)
+    simox = problem.simulator.quality == "simox"
     folder = folder_for(f"{problem.object.name} {problem.facet}", method, seed, out, study)
 
     outcomes = Outcomes(problem, checker if outcome == "held" else None)
@@ -200,7 +201,7 @@ def grasp(
             "contact": problem.simulator.contact,
             "quality": problem.simulator.quality,
             "closing": problem.simulator.closing,
-            "friction": problem.simulator.friction,
+            "friction": friction_in_words(problem.simulator) if simox else problem.simulator.friction,
             "input noise": noise,
         },
         describe=describe,

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["checked", "checker_for", "squeeze_in_words", "verdict_in_words"]
+__all__ = ["checked", "checker_for", "friction_in_words", "squeeze_in_words", "verdict_in_words"]
 
 _MOST = 10_000
 
@@ -51,6 +51,15 @@ def checked(checker: Any, problem: Any, candidate: Any, n: int, console: Any) ->
     for name, text in lines.items():
         console.print(f"{candidate.label}: {name}: {text}", markup=False, highlight=False, soft_wrap=True)
     return lines
+
+
+def friction_in_words(simulator: Any) -> str:
+    """Return the coefficient of friction, such as "0.5"; of the quality simox also its own, which never changes."""
+    from surehold.grasping.wrench.simox import FRICTION
+
+    plain = f"{simulator.friction:g}"
+    other = simulator.quality == "simox" and simulator.friction != FRICTION
+    return f"{FRICTION:g} in simox, {plain} in force closure" if other else plain
 
 
 def squeeze_in_words(checker: Any) -> str:

@@ -19,7 +19,7 @@ Formats = Annotated[
         help="Formats in which the grasps are written: isaac (always), graspgen, dexgraspbench; several by commas.",
     ),
 ]
-_UNUSED = ("facet", "variables", "cloud", "camera", "normals", "contacts", "cloud_noise", "prior", "shapes")
+_UNUSED = ("facet", "variables", "cloud", "camera", "normals", "contacts", "cloud_noise", "prior", "shapes", "plan")
 
 
 def _grasp_rate(
@@ -46,7 +46,7 @@ def _grasp_rate(
     from rich.table import Table
 
     from surehold.cli.compilation import announced
-    from surehold.cli.grasp_check import squeeze_in_words, verdict_in_words
+    from surehold.cli.grasp_check import friction_in_words, squeeze_in_words, verdict_in_words
     from surehold.cli.terminal import terminal
     from surehold.grasping.formats.gripper import stored_grasp
     from surehold.grasping.formats.writing import checked_formats, write_grasps
@@ -103,7 +103,7 @@ def _grasp_rate(
     unsaid = "" if content.settings else " The file names no options; those not given have their defaults."
     console.print(
         f"{file}: {amount(len(rated), 'grasp')} of hand {hand.name} on {body.name}, {simulator.quality} with "
-        f"{simulator.contact} contacts and friction {simulator.friction:g}{squeeze}.{unsaid}",
+        f"{simulator.contact} contacts and friction {friction_in_words(simulator)}{squeeze}.{unsaid}",
         markup=False,
         soft_wrap=True,
     )

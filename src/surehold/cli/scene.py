@@ -19,7 +19,7 @@ _COLUMNS = ("object", "mode", "standoff [mm]", "s1", "dx, dy [mm]", "status", "q
 _ALONG, _ACROSS = 9, 5  # grasps that are tried in a mode
 
 
-_UNUSED = ("variables", "cloud", "camera", "normals", "contacts", "cloud_noise", "prior", "shapes")
+_UNUSED = ("variables", "cloud", "camera", "normals", "contacts", "cloud_noise", "prior", "shapes", "plan")
 
 
 @partial(takes_grasp_options, without=_UNUSED)

@@ -18,6 +18,7 @@ from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.shipped import shipped_object
 from surehold.grasping.poses import FARTHEST, Pose, check_pose
 from surehold.grasping.wrench.quality import Measure
+from surehold.grasping.wrench.simox import check_cones
 from surehold.store.uninterrupted import uninterrupted
 
 __all__ = ["Simulator"]
@@ -48,7 +49,8 @@ class Simulator:
     preshape
         Type of grasp, one of the hand's `preshapes`; the first one if not given ("power" for the iCub).
     friction
-        Coefficient of friction; if not given the hand's, where it has one, else the object's own.
+        Coefficient of friction; if not given the hand's, where it has one, else the object's own. The quality "simox"
+        always takes 1: force closure, and the check by physics, are of that coefficient then.
     torsion
         Torsional friction of soft fingers: largest moment about the normal by normal force [m], see
         `soft_finger_torsion`; 0 for hard points.
@@ -114,6 +116,8 @@ class Simulator:
         rates = preshape_of(self.hand, preshape).rate
         self.preshape: Final = preshape or next(iter(self.hand.preshapes))
         self.collision: Final = collision
+        if quality == "simox":
+            check_cones(friction, torsion, edges)
         own = self.object.friction if self.hand.friction is None else self.hand.friction
         self.friction: Final[float] = own if friction is None else float(friction)
         self.measure: Final = Measure(

@@ -15,7 +15,12 @@ from surehold.studies.settings import StudySettings
 from surehold.studies.trial_function import problem_of
 
 SPACE = SearchSpace(Box({"dx": (0.0, 1.0), "dy": (0.0, 1.0)}))
-CHOSEN = [(name, choice) for name, option in OPTIONS.items() for choice in option.choices if name != "preset"]
+CHOSEN = [
+    (name, choice)
+    for name, option in OPTIONS.items()
+    for choice in option.choices
+    if name != "preset" and (name, choice) != ("plan", "mean")  # which is of a cloud
+]
 
 
 def test_the_command_line_names_every_option_that_text_can_say(capsys, monkeypatch):
@@ -46,6 +51,23 @@ def test_studies_and_plans_mean_what_python_means(name, choice):
     x = expected.box.from_unit([0.3, 0.5])
     assert study(x) == plan(x) == expected(x)
     assert study._settings == plan._settings == expected._settings | {"hand": study._settings["hand"]}
+
+
+def test_a_plan_for_clouds_is_refused_as_the_other_options_of_clouds():
+    for name, value in {"plan": "mean", "shapes": 3, "prior": "box"}.items():
+        with pytest.raises(InputError, match=f"{name} is for point clouds"):
+            problem_of(StudySettings(SPACE, problem={"grasp": {"object": "bottle", name: value}}))
+
+
+@pytest.mark.parametrize(("name", "value"), [("friction", 0.3), ("torsion", 0.002)])
+def test_cones_that_simox_does_not_have_are_refused_everywhere(name, value):
+    for given in ({"quality": "simox"}, {"preset": "thesis"}):
+        with pytest.raises(InputError, match=f"{name} is {value}, but the quality 'simox'"):
+            GraspProblem("bottle", **given, **{name: value})
+        with pytest.raises(InputError, match=f"{name} is {value}, but the quality 'simox'"):
+            build_problem(ProblemSetup("grasp", 8, 5, {"object": "bottle", **given, name: value}))
+    own = {"friction": 1.0, "torsion": 0.0, "cones": "polyhedral"}
+    assert GraspProblem("bottle", quality="simox", **own).simulator.friction == 1.0
 
 
 def test_unknown_options_are_explained():

@@ -22,7 +22,7 @@ from surehold.errors import InputError
 from surehold.grasping.wrench.friction_cones import contact_wrenches, finite_array
 from surehold.grasping.wrench.hull.inscribed_ball import ball_radius
 
-__all__ = ["ObjectWrenchSpace", "object_wrench_space", "simox_quality"]
+__all__ = ["FRICTION", "ObjectWrenchSpace", "check_cones", "object_wrench_space", "simox_quality"]
 
 FRICTION = 1.0
 EDGES = 8
@@ -38,6 +38,19 @@ class ObjectWrenchSpace:
     """Plain mean of the vertices [m]."""
     radius: float
     """Distance from the mean of the vertices of the object's wrench hull to its nearest facet, > 0."""
+
+
+def check_cones(friction: float | None, torsion: float, edges: int) -> None:
+    """Raise InputError if cones are asked for that simox does not have; a friction of None is not asked for."""
+    own = {"friction": FRICTION, "torsion": 0.0, "edges": EDGES}
+    given = {"friction": FRICTION if friction is None else friction, "torsion": torsion, "edges": edges}
+    for name, value in given.items():
+        if value != own[name]:
+            verb = "are" if name == "edges" else "is"
+            raise InputError(
+                f"{name} {verb} {value!r}, but the quality 'simox' always has cones of friction {FRICTION:g} and "
+                f"{EDGES} edges, without torsion; leave {name} out, or ask for another quality."
+            )
 
 
 def object_wrench_space(vertices: ArrayLike, faces: ArrayLike, max_faces: int = 300) -> ObjectWrenchSpace:

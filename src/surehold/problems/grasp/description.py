@@ -50,7 +50,7 @@ def described_object(words: Mapping[str, Any]) -> tuple[GraspObject, str]:
         from surehold.problems.grasp.from_cloud import object_of_cloud
 
         return object_of_cloud(given)
-    for option in ("camera", "normals", "contacts", "cloud_noise", "prior", "shapes"):
+    for option in ("camera", "normals", "contacts", "cloud_noise", "prior", "shapes", "plan"):
         if given[option] not in (None, OPTIONS[option].default):
             raise InputError(f"{option} is for point clouds; give one with cloud, or leave {option} out.")
     if not name:
