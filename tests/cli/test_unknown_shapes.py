@@ -280,8 +280,8 @@ def test_files_of_a_study_are_found_from_any_folder(here, monkeypatch):
             {"contacts": [{"point": [0.03, 0, 0], "normal": [v, 0, 0]} for v in (1, -1)]},
             "normals 180 degrees",
         ),
-        ({"contacts": [{"point": [0.03, 0], "normal": [1, 0, 0]}]}, "not read"),
-        ({"touches": 3}, "not read ('contacts')"),
+        ({"contacts": [{"point": [0.03, 0], "normal": [1, 0, 0]}]}, "point of contact 0 of contacts"),
+        ({"touches": 3}, "no list 'contacts'"),
     ],
 )
 def test_contacts_that_cannot_be_are_refused_in_one_line(here, capsys, told, said):

@@ -95,11 +95,12 @@ class TouchedShape:
         found = contacts_told(told)
         surface = self._belief.surface
         before = [c for t in trials if (c := t.user_attrs.get(CONTACTS)) and c != told and t.state.is_finished()]
-        if before:
+        felt = [contacts_told(c) for c in before]
+        if felt:
             run = Exploration(self.problem, self._belief, self._noise)
-            run.restore(np.empty((0, self.problem.box.dimension)), np.empty(0), [contacts_told(c) for c in before])
+            run.restore(np.empty((0, self.problem.box.dimension)), np.empty(0), felt)
             surface = run.belief.surface
-        checked_against(surface, found)
+        checked_against(surface, found, before=felt)
         return dict(told)
 
     def pose(self, parameters: Mapping[str, Any]) -> dict[str, Any]:

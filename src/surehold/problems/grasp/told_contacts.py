@@ -7,6 +7,7 @@ known is refused, with the numbers: a wrong frame, a wrong unit and inward norma
 """
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,6 +28,7 @@ _SAME_PLACE: Final = 0.001  # nearer contacts are of one spot of the surface [m]
 _LARGEST: Final = 2.0  # a coordinate [m]; what is larger was not told in meters
 _IMPOSSIBLE: Final = 6.0  # standard deviations that a contact may lie off what is known
 _CLOSE: Final = 0.008  # a contact nearer to the surface is never impossible [m]
+_INSIDE: Final = _IMPOSSIBLE * TOUCH_NOISE  # a contact as far inside free space is impossible [m]
 _CERTAIN: Final = 0.0015  # where the surface is known so well and is so near, normals are known: walls are thicker [m]
 _FORM: Final = '{"contacts": [{"point": [x, y, z], "normal": [x, y, z]}]} in meters'
 
@@ -73,17 +75,13 @@ def contacts_told(told: Any, what: str = "contacts") -> Observations:
     Raises
     ------
     InputError
-        If there are no contacts, a number is missing or not finite, a normal is not of unit length, or two contacts
-        at one place have opposite normals.
+        If there are no contacts, a key or number is missing, a number is not finite, a normal is not of unit length,
+        or two contacts at one place have opposite normals.
     """
-    try:
-        rows = told["contacts"]
-        points = np.array([row["point"] for row in rows], dtype=np.float64).reshape(len(rows), 3)
-        normals = np.array([row["normal"] for row in rows], dtype=np.float64).reshape(len(rows), 3)
-        free = np.array(told.get("free", []), dtype=np.float64).reshape(-1, 4)
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
-        reason = " ".join(str(error).split())[:80]
-        raise InputError(f"{what} are not read ({reason}); give {_FORM}.") from None
+    if not isinstance(told, Mapping) or not isinstance(told.get("contacts"), Sequence):
+        raise InputError(f"{what} hold no list 'contacts'; give {_FORM}.")
+    points, normals = _contacts(told["contacts"], what)
+    free = _free(told.get("free", []), what)
     if not 0 < len(points) <= _MOST and not (len(free) and len(free) <= _MOST):
         raise InputError(f"{what} hold {len(points)} touches; give 1 to {_MOST}.")
     length = np.linalg.norm(normals, axis=1)
@@ -105,6 +103,37 @@ def contacts_told(told: Any, what: str = "contacts") -> Observations:
     return found + Observations(free=free)
 
 
+def _contacts(rows: Sequence[Any], what: str) -> tuple[Array, Array]:
+    """Return points and normals (n, 3) as they were told; a contact that lacks one of them is named by its number."""
+    found: dict[str, list[Array]] = {"point": [], "normal": []}
+    for k, row in enumerate(rows):
+        if not isinstance(row, Mapping):
+            raise InputError(f"contact {k} of {what} is {str(row)[:60]!r}, without point and normal; give {_FORM}.")
+        for name, told in found.items():
+            if name not in row:
+                given = ", ".join(str(key)[:40] for key in row) or "nothing"
+                raise InputError(f"contact {k} of {what} has no {name!r}, but {given}; give {_FORM}.")
+            told.append(_numbers(row[name], 3, f"{name} of contact {k} of {what}"))
+    return np.reshape(found["point"], (-1, 3)), np.reshape(found["normal"], (-1, 3))
+
+
+def _free(rows: Any, what: str) -> Array:
+    """Return free balls (b, 4) as they were told."""
+    if not isinstance(rows, Sequence):
+        raise InputError(f"'free' of {what} is {str(rows)[:60]!r}; give [[x, y, z, radius], ...] in meters.")
+    return np.reshape([_numbers(row, 4, f"free ball {k} of {what}") for k, row in enumerate(rows)], (-1, 4))
+
+
+def _numbers(values: Any, n: int, what: str) -> Array:
+    try:
+        numbers = np.array(values, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        numbers = np.empty(0)
+    if numbers.shape != (n,):
+        raise InputError(f"{what} is {str(values)[:60]}; give {n} numbers in meters.")
+    return numbers
+
+
 def _agreeing(points: Array, normals: Array, what: str) -> None:
     """Refuse contacts of one place with opposite normals."""
     from scipy.spatial import KDTree
@@ -120,14 +149,19 @@ def _agreeing(points: Array, normals: Array, what: str) -> None:
         )
 
 
-def checked_against(surface: ImplicitSurface, told: Observations, what: str = "contacts") -> None:
-    """Refuse contacts that cannot be of the shape that is known.
+def checked_against(
+    surface: ImplicitSurface, told: Observations, what: str = "contacts", before: Sequence[Observations] = ()
+) -> None:
+    """Refuse contacts and free space that cannot be of the shape that is known; `before` was told of it earlier.
 
     Raises
     ------
     InputError
-        If a contact lies farther off the surface than is possible, or on it with a normal into the object.
+        If a contact lies farther off the surface than is possible, on it with a normal into the object, or in free
+        space; or if free space holds a point that is known of the surface.
     """
+    _outside_of_free(told, what, before)
+    _free_of_known(surface, told.free, what)
     if not len(told.points):
         return
     off = np.abs(surface.value(told.points))
@@ -147,3 +181,46 @@ def checked_against(surface: ImplicitSurface, told: Observations, what: str = "c
             f"contact {k} of {what} is {1e3 * off[k]:.0f} mm off the surface, which is known there to "
             f"{1e3 * known[k]:.0f} mm; give meters in the object's frame, or drop that contact."
         )
+
+
+def _outside_of_free(told: Observations, what: str, before: Sequence[Observations]) -> None:
+    """Refuse contacts within balls that were told to be free, now or before."""
+    for other in (told, *before):
+        if not len(told.points) or not len(other.free):
+            continue
+        inside = _depths(told.points, other.free)
+        k, ball = (int(i) for i in np.unravel_index(np.argmax(inside), inside.shape))
+        if inside[k, ball] > _INSIDE:
+            name = f"free ball {ball} of {what}" if other is told else "a free ball that was told before,"
+            raise InputError(
+                f"contact {k} of {what} is {1e3 * inside[k, ball]:.1f} mm inside {name} "
+                f"{_in_words(other.free[ball])}; where a hand touches is no free space: drop one of them, or make the "
+                "radius smaller."
+            )
+
+
+def _free_of_known(surface: ImplicitSurface, free: Array, what: str) -> None:
+    """Refuse balls told to be free that hold a contact told before, or a point of the cloud."""
+    known = surface.observations
+    on_surface = known.values == 0.0  # others are bounds
+    if not len(free) or not np.any(on_surface):
+        return
+    points = known.points[on_surface]
+    inside = _depths(points, free)
+    beyond = inside - np.maximum(_INSIDE, _IMPOSSIBLE * known.noise[on_surface])[:, None]
+    k, ball = (int(i) for i in np.unravel_index(np.argmax(beyond), beyond.shape))
+    if beyond[k, ball] > 0.0:
+        raise InputError(
+            f"free ball {ball} of {what}, {_in_words(free[ball])}, holds a known point of the surface, "
+            f"{points[k].round(4).tolist()}, {1e3 * inside[k, ball]:.1f} mm inside; give meters in the object's frame, "
+            "drop that ball, or make its radius smaller."
+        )
+
+
+def _depths(points: Array, balls: Array) -> Array:
+    """Return how far points (n, 3) are inside balls (b, 4), (n, b) [m]; outside of them it is negative."""
+    return balls[:, 3] - np.linalg.norm(points[:, None] - balls[None, :, :3], axis=2)
+
+
+def _in_words(ball: Array) -> str:
+    return f"[{', '.join(f'{v:.4g}' for v in ball)}]"
