@@ -38,12 +38,14 @@ def test_a_synergy_is_learned_and_grasped_with(here, capsys):
         ("hand synergy nothing.csv", "cannot read 'nothing.csv'"),
         (f"hand synergy {RECORDED} --components 9", "components are 9"),
         ("hand synergy subjects.csv", "column 'subject' is no joint of the hand"),
+        ("hand synergy degrees.csv", "give radians, or say --degrees"),
         (f"hand synergy {RECORDED} --hand nobody", "hand 'nobody' is unknown"),
         ("grasp mug --preshape nothing.yaml", "cannot read 'nothing.yaml'"),
     ],
 )
 def test_what_does_not_fit_is_one_line(line, words, capsys, here):
     rows = RECORDED.read_text().splitlines()
+    (here / "degrees.csv").write_text("index_proximal,thumb_knuckle\n10,115\n80,90\n45,60\n")
     (here / "subjects.csv").write_text("\n".join(f"{row},{'ann' if i else 'subject'}" for i, row in enumerate(rows)))
     assert run(line.split()) == 2
     assert words in " ".join(capsys.readouterr().err.split())

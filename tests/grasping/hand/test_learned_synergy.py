@@ -131,6 +131,21 @@ def test_too_little_is_refused():
         learn_synergy(hand.joint_names[:2], np.eye(3)[:, :2], hand, 3)
 
 
+def test_postures_in_degrees_are_refused_and_read_as_such():
+    hand, postures = icub_left_hand(), recorded()
+    degrees = np.degrees(postures.angles)
+    joint, row = "thumb_knuckle", int(np.argmax(degrees[:, postures.joints.index("thumb_knuckle")]))
+    upper = hand.upper.ravel()[hand.joint_names.index(joint)]
+    said = (
+        rf"joint '{joint}' is 115\.\d rad in posture {row}, but of hand 'icub-left' .* to {upper:.3g} rad; .* --degrees"
+    )
+    with pytest.raises(InputError, match=said):
+        learn_synergy(postures.joints, degrees, hand)
+    beyond = postures.angles.copy()
+    beyond[0, postures.joints.index("index_proximal")] = -3.0  # beyond its range, as a glove may say it
+    assert len(learn_synergy(postures.joints, beyond, hand).components) == 2
+
+
 def test_the_hand_closes_along_the_amplitudes_that_are_asked_for(tmp_path):
     hand, postures = icub_left_hand(), recorded()
     write_synergy(tmp_path / "s.yaml", learn_synergy(postures.joints, postures.angles, hand, 3))

@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 _FORMAT, _VERSION = "surehold_synergy", 1
 MOST: Final = 4  #: components: the closing one, and s1 to s3
 _TRIES: Final = 4  # values of s1 that the search of default poses tries
+_FAR_SHIFT: Final = 1.0  # a sliding joint is never so far beyond its range [m]: no hand is so large
 _SMALL: Final = 0.05  # a joint of a smaller share of the closing component does not decide where the hand is open
 
 
@@ -57,10 +58,12 @@ def learn_synergy(joints: Sequence[str], angles: Array, hand: Hand, components: 
     Raises
     ------
     InputError
-        If a joint is none of the hand, there are too few postures for so many components, or all are equal.
+        If a joint is none of the hand or cannot be where it is said to be, there are too few postures for so many
+        components, or all are equal.
     """
     x = np.asarray(angles, dtype=np.float64)
     places = _places(hand, joints)
+    _check_units(x, hand, joints, places)
     most = min(MOST, len(joints), len(x) - 1)
     if isinstance(components, bool) or not isinstance(components, int) or not 1 <= components <= max(most, 1):
         raise InputError(
@@ -184,6 +187,24 @@ def _places(hand: Hand, joints: Sequence[str]) -> list[int]:
         if name not in known:
             raise unknown_name(f"joint of hand '{hand.name}'", name, known)
     return [hand.joint_names.index(name) for name in joints]
+
+
+def _check_units(x: Array, hand: Hand, joints: Sequence[str], places: Sequence[int]) -> None:
+    """Refuse postures (n, j) that are in another unit: they would give a synergy that looks like one and is none."""
+    slides = hand.chains[:, :, 0].ravel()[places] > 0.0
+    lower, upper = hand.lower.ravel()[places], hand.upper.ravel()[places]
+    least = np.where(slides, lower - _FAR_SHIFT, np.minimum(lower, -2.0 * np.pi))
+    most = np.where(slides, upper + _FAR_SHIFT, np.maximum(upper, 2.0 * np.pi))
+    beyond = np.maximum(least - x, x - most)
+    if not len(x) or not beyond.max() > 0.0:
+        return
+    row, k = (int(i) for i in np.unravel_index(np.argmax(beyond), beyond.shape))
+    unit = "m" if slides[k] else "rad"
+    advice = "give meters" if slides[k] else "give radians, or say --degrees (of read_postures degrees=True)"
+    raise InputError(
+        f"joint {joints[k]!r} is {x[row, k]:.4g} {unit} in posture {row}, but of hand {hand.name!r} it goes from "
+        f"{lower[k]:.3g} to {upper[k]:.3g} {unit}; {advice}."
+    )
 
 
 def _closing(vector: Array, mean: Array, recorded: Array, lower: Array, upper: Array) -> tuple[float, float]:
