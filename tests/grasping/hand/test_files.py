@@ -157,7 +157,7 @@ def test_only_contact_links_touch(tmp_path, model):
         ({"fingers__left": ["b1", "a1"]}, ("not moved by 'b1'", "from the palm to the tip")),
         ({"fingers__right": ["d1"]}, ("neither turns nor slides",)),
         ({"fingers": {}}, ("fingers",)),
-        ({"palm": None}, ("palm: Field required",)),
+        ({"palm": None}, ("'palm' is missing",)),
         ({"palm__body": "nobody"}, ("body 'nobody' is unknown", "palm, a, b, c, d")),
         ({"palm__x": [0, 0, 2]}, ("two directions",)),
         ({"palm__z": [0, 0, 0]}, ("two directions",)),

@@ -27,11 +27,12 @@ Joints that no finger names do not move. Lengths are in meters, angles in radian
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from surehold.errors import InputError
+from surehold.grasping.hand.description_mistakes import mistakes_in_words
 from surehold.grasping.plain_data import plain_yaml
 
 __all__ = [
@@ -121,14 +122,26 @@ class HandConfig(_Strict):
     model: PackagedModel | ModelFile | None = None
 
 
+#: Valid keys of each mapping whose keys are not the author's own.
+_KEYS: Final = {
+    "": tuple(HandConfig.model_fields),
+    "palm": tuple(PalmConfig.model_fields),
+    "model": (*ModelFile.model_fields, *PackagedModel.model_fields),
+    "sources": ("finger_force", "friction"),
+    "coupling.*": tuple(Coupling.model_fields),
+    "preshapes.*": tuple(PreshapeConfig.model_fields),
+    "preshapes.*.posture": tuple(Posture.model_fields),
+}
+
+
 def read_hand_config(path: str | Path) -> HandConfig:
     """Read a hand's description.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is not plain YAML, or an entry is missing, unknown or of the wrong kind; the
-        message names the entry.
+        If the file cannot be read, is not plain YAML, or entries are missing, unknown or of the wrong kind; the
+        message names them with their lines.
     """
     content: Any = plain_yaml(path)
     if not isinstance(content, dict):
@@ -136,9 +149,7 @@ def read_hand_config(path: str | Path) -> HandConfig:
     try:
         return HandConfig.model_validate(content)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"]) or "the file"
-        more = f" ({error.error_count() - 1} more)" if error.error_count() > 1 else ""
+        said = mistakes_in_words(path, content, error.errors(), _KEYS)
         raise InputError(
-            f"{str(path)!r}: {place}: {first['msg']}{more}; see surehold.grasping.hand.configuration."
+            f"{str(path)!r}: {said}. All keys are in the docstring of surehold.grasping.hand.configuration."
         ) from None
