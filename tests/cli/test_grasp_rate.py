@@ -1,6 +1,7 @@
 """`surehold grasp rate`: a run's grasps of every format are rated again, and what does not fit is one line."""
 
 import json
+import re
 from copy import deepcopy
 
 import numpy as np
@@ -110,6 +111,30 @@ def test_a_name_in_brackets_is_shown_whole(block, capsys):
     content["grasps"] = {"[bold]": next(iter(content["grasps"].values()))}
     (block / "grasps.yaml").write_text(yaml.safe_dump(content))
     assert "[bold]" in rated("held/grasps.yaml", capsys)
+
+
+@pytest.mark.parametrize("width", [40, 60, 80])
+def test_a_narrow_terminal_loses_nothing(block, capsys, monkeypatch, width):
+    line = "held/grasps.yaml --samples 3 --check"
+    monkeypatch.setenv("COLUMNS", "200")
+    assert run(["grasp", "rate", *line.split()]) == 0
+    wide = capsys.readouterr().out
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert run(["grasp", "rate", *line.split()]) == 0
+    narrow = capsys.readouterr().out
+
+    def table(text):
+        rows = [row for row in text.splitlines() if "│" in row or "┃" in row]
+        cells = [[cell.strip() for cell in row.replace("┃", "│").split("│")] for row in rows]
+        return sorted("".join(column).replace(" ", "") for column in zip(*cells, strict=True))
+
+    assert table(narrow) == table(wide)
+    if width == 80:
+        assert "off: mean ┃ closed ┃ physics" in narrow, "headers and numbers are whole"
+    assert max(len(row) for row in narrow.splitlines() if "│" in row) <= width
+    (told,) = [row for row in wide.splitlines() if row.startswith(("highest", "recommended:"))]
+    assert re.search(r"(held|moved|slipped|dropped), .* under ", told)
+    assert told in narrow, "a sentence is left to the terminal to wrap"
 
 
 def test_of_simox_the_friction_is_told_that_it_has(here, capsys):

@@ -81,9 +81,11 @@ def _grasp_rate(
             console.print(f"Interrupted: {len(rated)} of {len(content.grasps)} grasps are rated.", soft_wrap=True)
     table = Table(title=None, show_edge=False, pad_edge=False, header_style="bold")
     columns = ["grasp", "confidence", "before", "status", "quality"]
-    for column in columns + (["off: mean", "closed"] if samples else []) + (["physics"] if check else []):
-        table.add_column(column, overflow="fold", min_width=len(column))
-    stored, squeeze = [], ""
+    columns += (["off: mean", "closed"] if samples else []) + (["physics"] if check else [])
+    roomy = console.width >= sum(map(len, columns)) + 3 * (len(columns) - 1)
+    for column in columns:  # words are folded; numbers, too, rather than cropped, where there is no room for them
+        table.add_column(column, overflow="fold", no_wrap=roomy and column not in ("grasp", "status"))
+    stored, squeeze, verdicts = [], "", []
     for one in rated:
         before = "" if one.stored.quality is None else f"{one.stored.quality:.3f}"
         row = [escape(one.stored.name), f"{one.stored.confidence:.2f}", before, one.grasp.status]
@@ -95,7 +97,9 @@ def _grasp_rate(
 
             checker = GraspChecker(one.simulator)
             squeeze = f"; squeezed with {squeeze_in_words(checker)}"
-            row.append(verdict_in_words(checker.check(one.grasp)))
+            verdict = checker.check(one.grasp)
+            row.append(verdict.verdict)
+            verdicts.append(f"{one.stored.name}: {verdict_in_words(verdict)}")
         table.add_row(*row)
         preshape = one.simulator.hand.preshapes[one.simulator.preshape]
         worth = one.grasp.quality if one.robust is None else one.robust.mean
@@ -108,6 +112,8 @@ def _grasp_rate(
         soft_wrap=True,
     )
     console.print(table)
+    for verdict in verdicts:
+        console.print(verdict, markup=False, soft_wrap=True)
     if samples:
         bounds = PoseNoise()
         console.print(
