@@ -140,6 +140,9 @@ def test_scene_holds_watertight_bodies_in_the_world(simulator):
     [
         ({"obj": "mugg"}, "did you mean 'mug'"),
         ({"hand": "barrett"}, "hand 'barrett' is unknown"),
+        ({"hand": "jaw.yaml"}, r"hand\.files\.packaged_hand\('jaw\.yaml'\)"),
+        ({"hand": "jaw.urdf"}, r"hand\.files\.load_hand\('jaw\.urdf', DESCRIPTION\)"),
+        ({"obj": "box.stl"}, r"mug, .*object\.mesh_files\.load_mesh\('box\.stl'\)\.object"),
         ({"contact": "soft"}, "graded, patch, single"),
         ({"quality": "epsilom"}, "did you mean 'epsilon'"),
         ({"closing": "fast"}, "adaptive, synergy"),
@@ -191,6 +194,13 @@ def test_poses_that_compiled_code_cannot_take_are_refused_by_all_that_take_one(s
         Simulator(obj="mug", object_pose=pose)
     with pytest.raises(InputError, match=r"finite|in meters"):
         grasp_batch(simulator, [Pose(), pose])
+
+
+def test_a_posture_may_be_a_scalar_of_numpy(simulator):
+    pose = pose_of(simulator)
+    grasp = simulator.grasp(pose, np.float32(-0.5))
+    assert grasp.quality == simulator.grasp(pose, -0.5).quality
+    assert len(grasp_scene(simulator, grasp).hand) == 21
 
 
 def test_postures_that_are_not_finite_are_refused(simulator):

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from surehold.errors import InputError
+from surehold.grasping.wrench.force_closure import gravity_wrenches
 from surehold.grasping.wrench.friction_cones import CheckedContacts, contact_wrenches, round_contacts, tangents
 from surehold.grasping.wrench.hull.inscribed_ball import ball_radius, hull_volume, inscribed_ball
 from surehold.grasping.wrench.wrench_space import wrench_quality
@@ -374,6 +375,22 @@ def test_volume_of_a_thin_hull():
         thin = w * [1, 1, 1, 1, 1, thickness]
         assert hull_volume(thin) == pytest.approx(volume * thickness, rel=1e-5)
     assert hull_volume(w * [1, 1, 1, 1, 1, 0]) == 0.0
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, np.float16])
+def test_scalars_of_numpy_are_numbers(kind):
+    angles = 2.0 * np.pi * np.arange(3) / 3.0
+    points = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
+    expected = wrench_quality(points, -points, friction=1.0, torque_length=2.0, torsion=1.0)
+    found = wrench_quality(points, -points, friction=kind(1), torque_length=kind(2), torsion=kind(1))
+    np.testing.assert_array_equal(found.wrenches, expected.wrenches)
+    assert found.epsilon == expected.epsilon > 0.0
+    center = (0.1, 0.0, 0.0)
+    np.testing.assert_array_equal(
+        gravity_wrenches(kind(3), center, torque_length=kind(2)), gravity_wrenches(3.0, center, torque_length=2.0)
+    )
+    with pytest.raises(InputError, match="torque_length must be a length"):
+        wrench_quality(points, -points, torque_length=kind(0))
 
 
 def test_too_many_wrenches_are_refused():

@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from surehold.errors import unknown_name
+from surehold.errors import InputError, unknown_name
 from surehold.grasping.hand.icub import icub_left_hand, icub_right_hand
 from surehold.grasping.hand.model import Hand
 
@@ -29,7 +29,16 @@ def hand_named(name: str) -> Hand:
     if name in _SHIPPED:
         return _SHIPPED[name]()
     if name not in _DESCRIBED:
-        raise unknown_name("hand", name, HANDS)
+        raise _unknown(name)
     from surehold.grasping.hand.files import packaged_hand
 
     return packaged_hand(Path(__file__).parents[1] / "assets" / "hands" / f"{name}.yaml")
+
+
+def _unknown(name: str) -> InputError:
+    """Return the error for a name that is none; of a file it says how to load one."""
+    error, suffix = unknown_name("hand", name, HANDS), Path(name).suffix.lower()
+    if not suffix:
+        return error
+    call = f"packaged_hand({name!r})" if suffix in (".yaml", ".yml") else f"load_hand({name!r}, DESCRIPTION)"
+    return InputError(f"{error} Load a hand's file first: surehold.grasping.hand.files.{call}.")

@@ -59,7 +59,7 @@ def closing_motion(hand: Hand, s1: float | Sequence[float] = 0.0, preshape: str 
         If the hand has no preshape of that name, or the preshape has fewer amplitudes.
     """
     chosen = preshape_of(hand, preshape)
-    first, *others = (s1,) if isinstance(s1, int | float) else s1
+    first, *others = (s1,) if isinstance(s1, int | float | np.number) else s1
     if len(others) > len(chosen.further):
         raise InputError(f"{len(others) + 1} amplitudes are given; the preshape has {len(chosen.further) + 1}.")
     start = chosen.start + first * chosen.posture

@@ -5,11 +5,12 @@ Each object stands in its own frame: z up, x to the right, y to the front, the o
 
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from surehold.errors import unknown_name
+from surehold.errors import InputError, unknown_name
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.solids import RevolvedProfile, RoundedBox, Solid, Tube, triangles
 
@@ -99,7 +100,11 @@ def shipped_object(name: str) -> GraspObject:
         If no object of that name is shipped.
     """
     if name not in _BUILDERS:
-        raise unknown_name("object", name, OBJECTS)
+        error = unknown_name("object", name, OBJECTS)
+        if not Path(name).suffix:
+            raise error
+        call = f"surehold.grasping.object.mesh_files.load_mesh({name!r}).object"
+        raise InputError(f"{error} Load a mesh's file first: {call}.")
     build, density, friction = _BUILDERS[name]
     solids = build()
     vertices, faces, volume, center = triangles(solids)

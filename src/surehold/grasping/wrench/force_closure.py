@@ -7,6 +7,8 @@ x   nonnegative combination of the wrenches, (m,)
 t   external wrench on the object, weighted, (6,)
 """
 
+from numbers import Real
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -102,11 +104,13 @@ def gravity_wrenches(
     point, default the six axis directions; torque_length [m] and origin [m] as given to `contact_wrenches`. Raises
     InputError for unusable values.
     """
-    if not (isinstance(weight, (int, float)) and np.isfinite(weight) and weight > 0.0):
+    if not (isinstance(weight, Real) and np.isfinite(weight) and weight > 0.0):
         raise InputError(f"weight must be finite and above 0, not {weight!r}.")
-    if not (isinstance(torque_length, (int, float)) and np.isfinite(torque_length) and torque_length > 0.0):
+    if not (isinstance(torque_length, Real) and np.isfinite(torque_length) and torque_length > 0.0):
         raise InputError(f"torque_length must be a finite length above 0 [m], not {torque_length!r}.")
-    arm = (finite_array("center_of_mass", center_of_mass, (3,)) - finite_array("origin", origin, (3,))) / torque_length
+    arm = (finite_array("center_of_mass", center_of_mass, (3,)) - finite_array("origin", origin, (3,))) / float(
+        torque_length
+    )
     axes = np.vstack((np.eye(3), -np.eye(3))) if directions is None else directions
-    forces = weight * finite_array("directions", axes, (None, 3))
+    forces = float(weight) * finite_array("directions", axes, (None, 3))
     return np.hstack((forces, np.cross(arm, forces)))

@@ -13,6 +13,7 @@ a, B     round contact: center and axes of the ellipsoid a + B z, |z| <= 1, the 
 and (6, 3)
 """
 
+from numbers import Real
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -84,7 +85,7 @@ class CheckedContacts(NamedTuple):
         mu = _coefficients("friction", friction, c)
         gamma = _coefficients("torsion", torsion, c)
         o = finite_array("origin", origin, (3,))
-        if not (isinstance(torque_length, (int, float)) and 1.0 / _LARGEST <= torque_length <= _LARGEST):
+        if not (isinstance(torque_length, Real) and 1.0 / _LARGEST <= float(torque_length) <= _LARGEST):
             raise InputError(
                 f"torque_length must be a length from {1.0 / _LARGEST:g} to {_LARGEST:g} m, not {torque_length!r}."
             )
@@ -102,7 +103,7 @@ class CheckedContacts(NamedTuple):
         kept = scale > 0.0
         if convention == "unit_magnitude":
             scale = scale / np.sqrt(1.0 + mu * mu)
-        contacts = cls(n, t, (p - o) / torque_length, mu, gamma / torque_length, scale)
+        contacts = cls(n, t, (p - o) / float(torque_length), mu, gamma / float(torque_length), scale)
         return contacts if kept.all() else cls(*(a[kept] for a in contacts))
 
 
@@ -203,7 +204,7 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
 
 def _coefficients(name: str, value: float | ArrayLike, c: int) -> NDArray[np.float64]:
     """Return coefficients of at least 0, one per contact, (c,)."""
-    a = np.full(c, value, float) if isinstance(value, (int, float)) else finite_array(name, value, (c,))
+    a = np.full(c, value, float) if isinstance(value, Real) else finite_array(name, value, (c,))
     if not np.all((a >= 0.0) & (a <= _LARGEST)):
         raise InputError(f"{name} must be at least 0 and at most {_LARGEST:g}, not {value!r}.")
     return a
