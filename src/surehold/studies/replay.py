@@ -22,8 +22,8 @@ _REPLAYED: Final = 60  # recommendations that are computed again
 def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
     """Return the told trials of a study as a `Result`; recommendations at up to 60 of them, evenly spread.
 
-    Of a study about a shape that is touched the only one is the last, that of `RobotStudy.recommend`. The trials have the
-    ids of the study, of which some may have told nothing.
+    Of a study about a shape that is touched the only one is the last, that of `RobotStudy.recommend`. The trials have
+    the ids of the study, of which some may have told nothing.
 
     Raises
     ------
