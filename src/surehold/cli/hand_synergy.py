@@ -30,7 +30,7 @@ def synergy(
     from surehold.problems.grasp.description import described_hand
 
     gripper = described_hand(hand, hand_config)
-    recorded = read_postures(postures, degrees, [name for name in gripper.joint_names if name])
+    recorded = read_postures(postures, degrees, gripper)
     found = learn_synergy(recorded.joints, recorded.angles, gripper, components)
     write_synergy(out, found)
     console = terminal()

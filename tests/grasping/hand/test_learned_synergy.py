@@ -1,5 +1,6 @@
 """Synergies from postures: against scikit-learn, the thesis' one component, and what the hand then does."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,9 +93,11 @@ def test_a_synergy_comes_back_and_a_bad_one_is_refused(tmp_path):
 
 
 def test_a_column_that_is_no_joint_is_named(tmp_path):
-    (tmp_path / "p.csv").write_text("a,b,subject\n1,2,ann\n")
+    hand = icub_left_hand()
+    first, second = [name for name in hand.joint_names if name][:2]
+    (tmp_path / "p.csv").write_text(f"{first},{second},subject\n1,2,ann\n")
     with pytest.raises(InputError, match="column 'subject' is no joint of the hand; leave it out"):
-        read_postures(tmp_path / "p.csv", of=["a", "b"])
+        read_postures(tmp_path / "p.csv", hand=hand)
 
 
 @pytest.mark.parametrize(
@@ -119,6 +122,18 @@ def test_recordings_of_other_shapes_are_read(tmp_path):
     found = read_postures(tmp_path / "p.csv", degrees=True)
     assert (found.joints, found.grasps) == (("b", "a"), ("power", "pinch"))
     np.testing.assert_allclose(found.angles, [[np.pi / 2, 0], [np.pi, np.pi / 4]])
+
+
+def test_degrees_are_of_joints_that_turn(tmp_path):
+    """A shift of 20 mm of a recording in degrees was read as .35 mm."""
+    hand = icub_left_hand()
+    chains = hand.chains.copy()
+    chains[0, 0, 0] = 1.0
+    hand = replace(hand, chains=chains)
+    slides, turns = np.array(hand.joint_names).reshape(hand.radii.shape)[0, :2]
+    (tmp_path / "p.csv").write_text(f"{slides},{turns}\n0.02,90\n")
+    found = read_postures(tmp_path / "p.csv", degrees=True, hand=hand)
+    np.testing.assert_allclose(found.angles, [[0.02, np.pi / 2]])
 
 
 def test_too_little_is_refused():

@@ -191,7 +191,7 @@ def _places(hand: Hand, joints: Sequence[str]) -> list[int]:
 
 def _check_units(x: Array, hand: Hand, joints: Sequence[str], places: Sequence[int]) -> None:
     """Refuse postures (n, j) that are in another unit: they would give a synergy that looks like one and is none."""
-    slides = hand.chains[:, :, 0].ravel()[places] > 0.0
+    slides = hand.slides.ravel()[places]
     lower, upper = hand.lower.ravel()[places], hand.upper.ravel()[places]
     least = np.where(slides, lower - _FAR_SHIFT, np.minimum(lower, -2.0 * np.pi))
     most = np.where(slides, upper + _FAR_SHIFT, np.maximum(upper, 2.0 * np.pi))

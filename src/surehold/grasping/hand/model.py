@@ -95,6 +95,11 @@ class Hand:
         return (*self.link_names, "palm")
 
     @cached_property
+    def slides(self) -> NDArray[np.bool_]:
+        """Which joints (f, j) slide; the others turn."""
+        return self.chains[:, :, 0] > 0.0
+
+    @cached_property
     def neighbors(self) -> NDArray[np.bool_]:
         """Which links (f j,) and boxes of the palm (p,) may overlap: (f j, p)."""
         return np.zeros((self.palm, len(self.palm_poses)), dtype=bool) if self.joined is None else self.joined
@@ -113,7 +118,7 @@ class Hand:
         For a turning joint that is how far the link's axis can ever be from the joint's origin.
         """
         near, far = np.linalg.norm(self.chains[:, :, 1:4], axis=2), np.linalg.norm(self.chains[:, :, 4:7], axis=2)
-        slides = self.chains[:, :, 0] > 0.0
+        slides = self.slides
         travel = np.where(slides, np.maximum(np.abs(self.lower), np.abs(self.upper)), 0.0)
         offsets = np.linalg.norm(self.chains[:, :, 7:].reshape(*self.radii.shape, 3, 4)[:, :, :, 3], axis=2)
         fingers, joints = self.radii.shape

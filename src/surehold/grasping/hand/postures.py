@@ -10,7 +10,6 @@ Angles are in radians, or in degrees if it is said; shifts of sliding joints are
 
 import csv
 import io
-from collections.abc import Collection
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError, unknown_name
+from surehold.grasping.hand.model import Hand
 from surehold.grasping.plain_data import regular_bytes
 
 __all__ = ["Postures", "read_postures"]
@@ -34,8 +34,8 @@ class Postures(NamedTuple):
     grasps: tuple[str, ...]  #: (n,) names; empty without such a column
 
 
-def read_postures(path: str | Path, degrees: bool = False, of: Collection[str] = ()) -> Postures:
-    """Read recorded postures; `of` are the joints of the hand, where those are known.
+def read_postures(path: str | Path, degrees: bool = False, hand: Hand | None = None) -> Postures:
+    """Read recorded postures of a hand, where that is known; `degrees` is of turning joints, shifts are in meters.
 
     Raises
     ------
@@ -57,9 +57,10 @@ def read_postures(path: str | Path, degrees: bool = False, of: Collection[str] =
     joints = [name for name in names if name != _LABEL]
     if not joints or len(names) > _MOST_COLUMNS or len(set(names)) != len(names) or "" in names:
         raise InputError(f"{where!r}: its first row must name up to {_MOST_COLUMNS} joints, each once.")
-    for name in joints if of else ():
-        if name not in of:
-            unknown = unknown_name("joint", name[:40], of)
+    known = [] if hand is None else [name for name in hand.joint_names if name]
+    for name in joints if known else ():
+        if name not in known:
+            unknown = unknown_name("joint", name[:40], known)
             raise InputError(
                 f"{where!r}: column {name[:40]!r} is no joint of the hand; leave it out, or mend it: {unknown}"
             )
@@ -79,4 +80,8 @@ def read_postures(path: str | Path, degrees: bool = False, of: Collection[str] =
             if not np.isfinite(angles[i, k]):
                 raise InputError(f"{where!r}, row {i + 2}, {name}: {entry[:40]!r} is no finite number.")
             k += 1
-    return Postures(tuple(joints), np.radians(angles) if degrees else angles, tuple(grasps))
+    if degrees:
+        sliding = [] if hand is None else np.array(hand.joint_names)[hand.slides.ravel()].tolist()
+        turning = [k for k, name in enumerate(joints) if name not in sliding]
+        angles[:, turning] = np.radians(angles[:, turning])
+    return Postures(tuple(joints), angles, tuple(grasps))
