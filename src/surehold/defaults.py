@@ -226,6 +226,9 @@ SLICE_WIDTH: Final = 6.0
 #: prior. Never measured.
 MODE_STARTS: Final = (-2.0, -1.0, 0.0, 1.0)
 MODE_REACH: Final = 6.0
+#: Logarithm of the noise variance, in squared standard deviations of the outputs, where it starts once more: half of
+#: what there is. What this does: python -m benchmarks.inferred_noise.
+MODE_NOISE_START: Final = log(0.5)
 #: Where L-BFGS-B ends: the mode guides a sampler, and within 1e-3 of the top is enough. Never measured.
 MODE_TOLERANCES: Final = {"maxiter": 50, "ftol": 1e-5, "gtol": 1e-2}
 #: Step of the differences of gradients that give the curvature at the mode, in logarithms. Never measured.

@@ -340,7 +340,7 @@ class Optimizer(Record):
                 int(self._trials.successful.sum()),
                 self._sign,
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
-                self._model.execution_noise(self._trials),
+                self._model.execution_noise(self._trials, reached),
                 "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
                 self.risk,
                 ranking.judged(posterior, highest[0], u),

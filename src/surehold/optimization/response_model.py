@@ -11,6 +11,7 @@ from surehold.optimization.diagnosis import Diagnosis, diagnosis
 from surehold.optimization.lattice import Lattice, LatticePosterior
 from surehold.optimization.low_tail import LowTail, low_tail_of
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.numerics.threads import computing
 from surehold.optimization.strategy.thesis import ThesisConstants
 from surehold.optimization.surrogates.gaussian_process.model import learnt_from
@@ -25,6 +26,10 @@ from surehold.optimization.trials import Trials
 from surehold.store import background
 
 __all__ = ["ResponseModel", "chosen_surrogate"]
+
+_SAME_PLACE: Final = 1e-7  # in the unit cube
+_SAME_VALUE: Final = 1e-9  # of the values' range
+_LOOKED_AT: Final = 64  # trials at which the spread of executions is averaged
 
 
 def chosen_surrogate(
@@ -168,22 +173,55 @@ class ResponseModel:
         rng = np.random.default_rng([self._seed, 1, len(trials) if self._continues_chains else 0])
         if self._told and isinstance(self._surrogate, NoisySurrogate):
             return self._surrogate.condition(trials.reached, values, rng, previous, trials.deviations)
-        return self._surrogate.condition(trials.reached, values, rng, previous)
+        told = self._informative(trials)
+        return self._surrogate.condition(trials.reached[told], values[told], rng, previous)
+
+    def _informative(self, trials: Trials) -> NDArray[np.bool_]:
+        """Tell which trials (t,) the surrogate is told: of exact ones of the same place and value, the first.
+
+        The others tell nothing, but to learn hyperparameters from them would make the model surer with each: its
+        signal variance is what the values need divided by how many there are.
+        """
+        values = trials.modelled if self._screened else trials.values
+        every = np.ones(len(values), dtype=bool)
+        noisy = self._told or self._straying is not None or getattr(self._surrogate, "noisy", False)
+        if noisy or self._continues_chains:  # the thesis' models take every trial as it comes
+            return every
+        unit = _SAME_VALUE * (float(np.ptp(values)) or 1.0)
+        rows = np.column_stack([trials.reached / _SAME_PLACE, (values - values.min()) / unit])
+        _, first = np.unique(np.round(rows), axis=0, return_index=True)
+        return np.isin(np.arange(len(values)), first)
 
     def diagnosis(self, trials: Trials) -> Diagnosis | None:
         """Return how well the model explains the trials told so far; None where it cannot tell."""
         posterior = self.posterior(trials)
         if isinstance(posterior, LatticePosterior):
             posterior = posterior.unrounded
-        return diagnosis(posterior, trials.reached, trials.modelled)
+        told = self._informative(trials)
+        return diagnosis(posterior, trials.reached[told], trials.modelled[told])
 
-    def execution_noise(self, trials: Trials) -> float | None:
+    def execution_noise(self, trials: Trials, executions: Perturbations) -> float | None:
         """Return the variance of the observation noise of one execution; None is what the surrogate says.
 
-        What the surrogate learns from trials that strayed contains the input noise, which executions have anyway.
-        Where each trial tells its own, the mean of theirs.
+        What the surrogate learns from trials that strayed contains the input noise, which executions have anyway: where
+        noise is learnt, what is left of it when the spread that `executions` have at the trials is taken off. Where
+        each trial tells its own, the mean of theirs.
         """
         if self._told:
             return float(np.mean(trials.deviations[trials.successful] ** 2))
-        known = getattr(self._surrogate, "known_noise", None) if self._straying is not None else None
-        return None if known is None else known**2
+        if self._straying is None:
+            return None
+        known = getattr(self._surrogate, "known_noise", None)
+        if known is not None:
+            return known**2
+        strayed = trials.successful & ~trials.reported
+        if not strayed.any():
+            return None
+        rows = np.flatnonzero(strayed)
+        places = trials.reached[rows[np.linspace(0, len(rows) - 1, min(len(rows), _LOOKED_AT)).astype(np.intp)]]
+        posterior, weights = self.posterior(trials), executions.quadrature.weights
+        points = executions.around(places)
+        means = posterior.moments(points.reshape(-1, points.shape[2])).mean.mean(axis=0).reshape(points.shape[:2])
+        spread = (means - (means @ weights)[:, None]) ** 2 @ weights
+        learnt = float(posterior.noise_variance(places).mean())
+        return max(learnt - float(spread.mean()) * len(rows) / int(trials.successful.sum()), 0.0)

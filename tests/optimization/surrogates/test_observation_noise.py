@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.optimize import minimize
+from scipy.stats import multivariate_normal, norm
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
@@ -9,8 +10,10 @@ from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.gaussian_process.heteroscedastic import log_evidence_of_a_constant
-from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning
+from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, mode
+from surehold.optimization.surrogates.gaussian_process.likelihood import log_posterior
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.local_global.model import LocalGlobalProcess
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
@@ -55,6 +58,38 @@ def test_noise_std_is_what_was_said_or_learnt(noise):
         np.testing.assert_allclose(found, 0.3, rtol=0.15)
     else:
         np.testing.assert_allclose(found, 0.0 if noise == "none" else noise)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_noise_as_large_as_the_signal_is_found(seed):
+    """A rough function under little noise is a mode, too, and the only one that an ascent from little noise finds."""
+    rng = np.random.default_rng(seed)
+    X = rng.random((80, 2))
+    y = np.sin(5 * X[:, 0]) + rng.standard_normal(80)
+    optimizer = Optimizer(Box.unit(2), noise="inferred", seed=0)
+    optimizer.restore(X, y)
+    answer = optimizer.recommend()
+    stated = optimizer.posterior.noise_variance(answer.x[None, :]).mean() ** 0.5
+    assert stated == pytest.approx(1.0, rel=0.3)
+    below = norm.cdf(answer.quantile - np.sin(5 * answer.x[0]))
+    assert below < 0.15, f"{below:.0%} of executions fall below the stated 5 % quantile"
+
+
+def test_the_mode_is_as_good_as_the_best_of_many_ascents():
+    rng = np.random.default_rng(4)
+    X = rng.random((60, 2))
+    y = np.sin(5 * X[:, 0]) + rng.standard_normal(60)
+    model = GaussianProcess(noise="inferred")
+    evidence = model._evidence(X, y, Standardization.of(y, None), [60], [1.0], None)
+    center, _ = mode(evidence)
+    tops = []
+    for _ in range(30):
+        start = evidence.prior_mean + evidence.prior_deviation * rng.standard_normal(len(center))
+        found = minimize(
+            lambda theta: -log_posterior(theta, evidence), start, method="Nelder-Mead", options={"maxiter": 2000}
+        )
+        tops.append(-found.fun)
+    assert log_posterior(center, evidence) > max(tops) - 0.1
 
 
 def test_heteroscedastic_noise_is_found():

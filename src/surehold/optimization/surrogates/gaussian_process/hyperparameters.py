@@ -15,6 +15,7 @@ from surehold.defaults import (
     ADDITIVE_UP_TO,
     BURN_IN,
     INTERACTION_PRIOR,
+    MODE_NOISE_START,
     MODE_REACH,
     MODE_STARTS,
     MODE_TOLERANCES,
@@ -47,6 +48,7 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import (
 __all__ = ["Learning", "Learnt", "Prior", "from_prior", "learn", "log_evidence_and_root", "mode", "shared_out"]
 
 _ABSENT = -50.0  # log(w / (1 - w)) of a short part that adds nothing in double precision, log a that is none
+_SAME = 0.1  # of theta: ascents that end as near as this have found the same mode
 _METHODS = ("elliptical_slice", "slice", "map")
 
 
@@ -240,7 +242,9 @@ def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
     """Return the mode of the log posterior (p,) and the number of evaluations it took.
 
     Common length-scales on a coarse grid are tried first, of two scales each with a small and a larger share of the
-    short part; the best one is refined by L-BFGS-B with the analytic gradient.
+    short part; the best one is refined by L-BFGS-B with the analytic gradient. Where noise is learnt, so is the best
+    one under much noise: a rough function under little noise and a smooth one under much are two modes, and no ascent
+    leads from one to the other. The one with the larger evidence around it counts.
     """
     from scipy.optimize import minimize
 
@@ -252,14 +256,28 @@ def mode(evidence: Evidence) -> tuple[NDArray[np.float64], int]:
         rough = starts.copy()
         rough[:, d + 1] += deviation[d + 1]
         starts = np.concatenate([starts, rough])
-    values = [log_posterior(start, evidence) for start in starts]
-    best = int(np.argmax(values))
 
     def negative(theta: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         value, gradient = log_posterior_and_gradient(theta, evidence)
         return (1e25, gradient) if value == -np.inf else (-value, -gradient)
 
     bounds = list(zip(mean - MODE_REACH * deviation, mean + MODE_REACH * deviation, strict=True))
-    found = minimize(negative, starts[best], jac=True, method="L-BFGS-B", bounds=bounds, options=MODE_TOLERANCES)
-    theta = found.x if -found.fun > values[best] else starts[best]
-    return np.ascontiguousarray(theta), len(starts) + int(found.nfev)
+
+    def refined(starts: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+        values = [log_posterior(start, evidence) for start in starts]
+        best = int(np.argmax(values))
+        found = minimize(negative, starts[best], jac=True, method="L-BFGS-B", bounds=bounds, options=MODE_TOLERANCES)
+        theta = found.x if -found.fun > values[best] else starts[best]
+        return np.ascontiguousarray(theta), len(starts) + int(found.nfev)
+
+    theta, evaluations = refined(starts)
+    if evidence.learn_noise:
+        noisy = starts.copy()
+        noisy[:, -1] = MODE_NOISE_START
+        other, more = refined(noisy)
+        evaluations += more
+        if np.abs(other - theta).max() > _SAME:
+            known = [log_evidence_and_root(evidence, place)[0] for place in (theta, other)]
+            evaluations += 2 * (theta.size + 1)
+            theta = other if known[1] > known[0] else theta
+    return theta, evaluations
