@@ -134,7 +134,7 @@ def test_asks_that_overlap_start_the_process():
     study = told(6)
     asks = Prepared(study)
     with ThreadPoolExecutor(2) as pool:
-        with study.storage.handing_out(study.name):  # both wait for this thread
+        with study.storage.handing_out():  # both wait for this thread
             waiting = [pool.submit(asks.ask) for _ in range(2)]
             while asks._asking < 2:
                 time.sleep(0.01)

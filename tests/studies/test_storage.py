@@ -164,7 +164,7 @@ def test_a_file_of_somebody_else_keeps_its_lines(tmp_path):
 HOLDING = """
 import sys, time
 from surehold.studies.storage import open_storage
-with open_storage(sys.argv[1], "mug", create=True).handing_out("mug"):
+with open_storage(sys.argv[1], "mug", create=True).handing_out():
     print("held", flush=True)
     time.sleep(3600)
 """
@@ -182,7 +182,7 @@ def test_the_lock_ends_with_its_process(url):
     holder.kill()
     holder.communicate()
     assert waiter.communicate(timeout=600)[0].strip() == "held"
-    with storage.handing_out("mug"), storage.handing_out("mug"):
+    with storage.handing_out(), storage.handing_out():
         pass
     storage.close()
 

@@ -1,4 +1,7 @@
-"""The stored trials of one study: who makes each, and what came of it. Every operation is whole or did not happen."""
+"""The stored trials of one study: who makes each, and what came of it. Every operation is whole or did not happen.
+
+Those that change a trial because of what it was need `Storage.answering`; `store` needs `Storage.handing_out`.
+"""
 
 import time
 from collections.abc import Mapping
@@ -205,15 +208,20 @@ class Ledger:
     def veto(self, id: int, reason: str) -> None:
         """Store that a trial must not be made; see `RobotStudy.veto`."""
         trial = self.trial(id)
+        if trial.state.is_finished():  # before anything is written: SQLite would take the reason
+            self._vetoed(trial)
+            return
         try:
             self._backend.set_trial_user_attr(trial._trial_id, VETOED, reason)
             self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
-        except UpdateFinishedTrialError:
-            trial = self.trial(id)
-            if VETOED not in trial.user_attrs or trial.state != TrialState.FAIL:
-                raise AnswerRefused(
-                    f"trial {id} is finished ({answer_of(trial)}); only a pending one can be vetoed."
-                ) from None
+        except UpdateFinishedTrialError:  # somebody else was quicker, by Optuna's means
+            self._vetoed(self.trial(id))
+
+    def _vetoed(self, trial: FrozenTrial) -> None:
+        if VETOED not in trial.user_attrs or trial.state != TrialState.FAIL:
+            raise AnswerRefused(
+                f"trial {trial.number} is finished ({answer_of(trial)}); only a pending one can be vetoed."
+            )
 
 
 def holder_of(trial: FrozenTrial) -> Holder | None:

@@ -79,7 +79,7 @@ class OpenedStudy:
             If the storage cannot be used, or the study exists and may not be resumed or has other settings.
         """
         opened = open_storage(storage, checked_name(name), create=True)
-        with opened.closed_on_error(), opened.failures(), opened.handing_out(name):
+        with opened.closed_on_error(), opened.failures(), opened.handing_out():
             if name not in optuna.get_all_study_names(opened.backend):
                 direction = StudyDirection[settings.direction.upper()]
                 study = optuna.create_study(storage=opened.backend, study_name=name, direction=direction)

@@ -80,17 +80,18 @@ class RobotStudy(OpenedStudy):
         """
         now = time.time()
         until = None if lifetime is None else now + lifetime
-        with self.storage.failures(), self.storage.handing_out(self.name):
-            trials = self._ledger.trials()
+        with self.storage.failures(), self.storage.handing_out():
             reason = self.paused
             if reason is not None:
                 raise NothingToAsk(f"study '{self.name}' is paused ({reason}); resume it first.", paused=True)
-            trial = self._ledger.held(trials, worker) or self._ledger.orphan(trials, now)
-            if trial is not None:
-                before = holder_of(trial)
-                attempts = 1 if before is None else before.attempts + 1
-                self._ledger.hold(trial, Holder(worker or "", until, attempts))
-                return self._asked(trial, True)
+            with self.storage.answering():
+                trials = self._ledger.trials()
+                trial = self._ledger.held(trials, worker) or self._ledger.orphan(trials, now)
+                if trial is not None:
+                    before = holder_of(trial)
+                    attempts = 1 if before is None else before.attempts + 1
+                    self._ledger.hold(trial, Holder(worker or "", until, attempts))
+                    return self._asked(trial, True)
             reason, promise = self._stop_reason(trials, now)
             if reason:
                 message = (
@@ -100,8 +101,9 @@ class RobotStudy(OpenedStudy):
                 raise NothingToAsk(message, paused=False)
             holder = Holder(worker or "", until, 1)
             if any(t.state == TrialState.WAITING for t in trials):  # enqueued by Optuna's means
-                trial = self._ledger.trial(self.study.ask(self.settings.space.distributions).number)
-                self._ledger.hold(trial, holder)
+                with self.storage.answering():  # or a veto of it may be lost
+                    trial = self._ledger.trial(self.study.ask(self.settings.space.distributions).number)
+                    self._ledger.hold(trial, holder)
             else:
                 found = None if prepared is None else prepared(trials)
                 parameters, behind = found or (self._suggested(trials), 0)
@@ -112,7 +114,7 @@ class RobotStudy(OpenedStudy):
 
     def renew(self, id: int, worker: str, lifetime: float) -> None:
         """Say that a worker is alive for `lifetime` more seconds; 0 lets its trial be taken up at once."""
-        with self.storage.failures():
+        with self.storage.failures(), self.storage.answering():
             self._ledger.renew(id, worker, lifetime)
 
     def next(self) -> dict[str, Any]:
@@ -171,7 +173,8 @@ class RobotStudy(OpenedStudy):
         with self.storage.failures():
             if failed == "rig":
                 checked_value(value, failed=True)
-                return self._ledger.let_go(id)
+                with self.storage.answering():
+                    return self._ledger.let_go(id)
             if contacts is not None:
                 if self._touched is None:
                     raise InputError(
@@ -181,7 +184,8 @@ class RobotStudy(OpenedStudy):
                 contacts = self._touched.checked(contacts, self._ledger.trials())
             outputs = self._checked(constraints, bool(failed))
             share, executions = answer(self.settings.optimizer, value, successes, of)
-            return self._ledger.tell(id, share, bool(failed), reached, outputs, contacts, executions)
+            with self.storage.answering():
+                return self._ledger.tell(id, share, bool(failed), reached, outputs, contacts, executions)
 
     def _checked(self, constraints: Mapping[str, Any] | None, failed: bool) -> dict[str, float]:
         values = checked_outputs(self.limits, constraints, failed)
@@ -212,7 +216,7 @@ class RobotStudy(OpenedStudy):
         if executions != 1:
             marks[EXECUTIONS] = executions
         state = TrialState.FAIL if failed else TrialState.COMPLETE
-        with self.storage.failures(), self.storage.handing_out(self.name):
+        with self.storage.failures(), self.storage.handing_out():
             return self._ledger.store(state, commanded, marks, number).number
 
     def veto(self, id: int, reason: str = "") -> None:
@@ -223,7 +227,7 @@ class RobotStudy(OpenedStudy):
         InputError
             If there is no such trial, or it is finished.
         """
-        with self.storage.failures():
+        with self.storage.failures(), self.storage.answering():
             self._ledger.veto(id, reason or "no reason given")
 
     @property

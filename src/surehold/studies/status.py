@@ -72,7 +72,7 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
                 "begun": trial.datetime_start.isoformat() if trial.datetime_start else None,
                 "finished": trial.datetime_complete.isoformat() if trial.datetime_complete else None,
                 "worker": holder.name if holder is not None else None,
-                "note": trial.user_attrs.get(VETOED) or trial.user_attrs.get(NOTE),
+                "note": trial.user_attrs.get(VETOED if _state(trial) == "vetoed" else NOTE),
             }
         )
     return found

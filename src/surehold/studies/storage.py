@@ -1,4 +1,4 @@
-"""Where a study is kept: a journal file, SQLite or PostgreSQL, by URL; and the lock under which trials are handed out.
+"""Where a study is kept: a journal file, SQLite or PostgreSQL, by URL; and the locks of a study.
 
     ""                          the journal of a run, runs/NAME/journal.log
     path/to/journal.log         a journal file: one line an operation, forced to the disk before the operation returns
@@ -7,19 +7,18 @@
     postgresql://user@host/db   PostgreSQL
     memory                      the process' own memory, gone with it
 
-Who hands out a trial holds the study's lock: no two workers get the same one, and each sees what the others were given.
-The locks are the operating system's (files) or the server's (PostgreSQL): they end with the process that holds them,
-however it ends.
+Who hands out a trial holds one lock of the study (`handing_out`): no two workers get the same one, and each sees what
+the others were given. Who changes a trial because of what it was holds another (`answering`): the first answer counts,
+though a database looks and writes in two steps. It is not held while a model is asked: an answer would wait for that.
+Who needs both takes it second.
 """
 
 import json
 import os
 import re
-import threading
 import warnings
-import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
@@ -29,7 +28,8 @@ from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, get_st
 from optuna.storages.journal import BaseJournalBackend, JournalFileBackend
 
 from surehold.errors import InputError
-from surehold.store.locks import file_lock, locked
+from surehold.store.locks import file_lock
+from surehold.studies.study_lock import StudyLock
 
 __all__ = ["JOURNAL", "Storage", "StorageFailure", "checked_name", "open_storage"]
 
@@ -56,30 +56,25 @@ class StorageFailure(InputError):
 
 
 class Storage:
-    """An opened storage: Optuna's `backend`, its `url` (`shown` without password), and the lock of each study in it."""
+    """An opened storage: Optuna's `backend`, its `url` (`shown` without password), and the locks of a study in it."""
 
-    def __init__(self, backend: BaseStorage, url: str, lock_file: Path | None, engine: Any = None):
+    def __init__(self, backend: BaseStorage, url: str, name: str, beside: Path | None, engine: Any = None):
         self.backend: Final = backend
         self.url: Final = url
         self.shown: Final = _without_password(url)
-        self._lock_file = lock_file
         self._engine = engine
-        self._threads = threading.RLock()
-        self._depth = 0
+        self._asking, self._telling = (
+            StudyLock(key, None if beside is None else beside.with_name(beside.name + ending), engine)
+            for key, ending in ((f"surehold:{name}", ".asking"), (f"surehold answers:{name}", ".telling"))
+        )
 
-    @contextmanager
-    def handing_out(self, name: str) -> Iterator[None]:
-        """Hold the lock of the study of that name; only one thread of all processes does at a time."""
-        with self._threads:
-            if self._depth:
-                yield
-                return
-            self._depth = 1
-            try:
-                with self._across_processes(name):
-                    yield
-            finally:
-                self._depth = 0
+    def handing_out(self) -> AbstractContextManager[None]:
+        """Hold the lock under which trials are handed out; only one thread of all processes does at a time."""
+        return self._asking.held()
+
+    def answering(self) -> AbstractContextManager[None]:
+        """Hold the lock under which a trial is looked at and then changed; within `handing_out`, not around it."""
+        return self._telling.held()
 
     @contextmanager
     def failures(self) -> Iterator[None]:
@@ -111,24 +106,6 @@ class Storage:
         if self._engine is not None:
             self._engine.dispose()
 
-    @contextmanager
-    def _across_processes(self, name: str) -> Iterator[None]:
-        if self._lock_file is not None:
-            with locked(self._lock_file):
-                yield
-        elif self._engine is not None:
-            from sqlalchemy import text
-
-            key = {"key": zlib.crc32(f"surehold:{name}".encode())}
-            with self._engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
-                connection.execute(text("SELECT pg_advisory_lock(:key)"), key)
-                try:
-                    yield
-                finally:
-                    connection.execute(text("SELECT pg_advisory_unlock(:key)"), key)
-        else:
-            yield
-
 
 def open_storage(url: str, name: str, *, create: bool) -> Storage:
     """Open the storage at a URL (see above) for the study `name`.
@@ -143,15 +120,15 @@ def open_storage(url: str, name: str, *, create: bool) -> Storage:
     scheme, separator, rest = url.partition("://")
     scheme = scheme.split("+")[0].lower()
     if url == "memory":
-        return Storage(InMemoryStorage(), url, None)
+        return Storage(InMemoryStorage(), url, name, None)
     if scheme == "sqlite" and separator:
-        return _sqlite(url, create)
+        return _sqlite(url, name, create)
     if scheme in ("postgresql", "postgres") and separator:
-        return _postgresql(f"postgresql+psycopg://{rest}", url)
+        return _postgresql(f"postgresql+psycopg://{rest}", url, name)
     if separator and scheme != "journal":
         raise InputError(f"storage {url!r} is of no kind that is known; give {_SCHEMES}.")
     path = Path(rest if separator else url) if url else Path("runs") / name / JOURNAL
-    return _journal(path, create)
+    return _journal(path, name, create)
 
 
 # --- files --------------------------------------------------------------------------------------------------------
@@ -245,7 +222,7 @@ def _missing(shown: str, path: Path) -> InputError:
     return InputError(f"storage {shown!r} does not exist{looked}; give --storage, or create the study first.")
 
 
-def _journal(path: Path, create: bool) -> Storage:
+def _journal(path: Path, name: str, create: bool) -> Storage:
     if path.is_dir():
         path = path / JOURNAL
     if not path.exists() and not create:
@@ -267,13 +244,13 @@ def _journal(path: Path, create: bool) -> Storage:
         raise InputError(
             f"storage {str(path)!r} cannot be read: no journal, damaged, or of a newer version of Optuna ({error})."
         ) from None
-    return Storage(backend, str(path), path.with_suffix(path.suffix + ".asking"))
+    return Storage(backend, str(path), name, path)
 
 
 # --- databases ----------------------------------------------------------------------------------------------------
 
 
-def _sqlite(url: str, create: bool) -> Storage:
+def _sqlite(url: str, name: str, create: bool) -> Storage:
     from sqlalchemy.engine import make_url
 
     file = make_url(url).database
@@ -290,12 +267,12 @@ def _sqlite(url: str, create: bool) -> Storage:
         raise InputError(f"storage {url!r} cannot be written: {error.strerror or error}.") from None
     arguments: dict[str, Any] = {} if "timeout" in make_url(url).query else {"timeout": _SQLITE_PATIENCE}
     storage, engine = _database(url, url, {"connect_args": arguments})
-    return Storage(storage, url, path.with_name(path.name + ".asking"), engine)
+    return Storage(storage, url, name, path, engine)
 
 
-def _postgresql(driver_url: str, url: str) -> Storage:
+def _postgresql(driver_url: str, url: str, name: str) -> Storage:
     storage, engine = _database(driver_url, url, {"pool_pre_ping": True, "connect_args": {"connect_timeout": 10}})
-    return Storage(storage, url, None, engine)
+    return Storage(storage, url, name, None, engine)
 
 
 def _database(driver_url: str, url: str, engine_kwargs: dict[str, Any]) -> tuple[BaseStorage, Any]:
