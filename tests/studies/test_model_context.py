@@ -9,6 +9,7 @@ import pytest
 
 import surehold as sh
 from surehold.studies import RobotStudy, SearchSpace, StudySettings
+from surehold.studies.history import REACHED
 
 pytest.importorskip("mcp")
 
@@ -79,9 +80,52 @@ def test_refusals_are_errors_of_the_tool(study):
     again, unknown, state = asyncio.run(refused())
     assert again.is_error
     assert unknown.is_error
-    assert "99" in unknown.content[0].text
+    assert unknown.content[0].text == "trial 99 is not in study 'hill'; the last one is 0."
     assert state["complete"] == 1
     assert state["best_value"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("tool", "arguments", "words"),
+    [
+        ("tell", {"id": 0, "value": True}, "'True' was told, but this study is told values"),
+        ("tell", {"id": 0, "value": "0.5"}, 'value is "0.5"; send a finite number, or leave it out and send failed'),
+        ("tell", {"id": 0, "value": "high"}, 'value is "high"; send a finite number'),
+        ("tell", {"id": 0, "value": 0.5, "reachd": {"x": 0.5}}, "field 'reachd' is unknown; did you mean 'reached'?"),
+        ("tell", {"id": 0, "vaule": 0.5}, "field 'vaule' is unknown; did you mean 'value'?"),
+        ("tell", {"id": "0", "value": 0.5}, 'id is "0"; it must be a valid integer.'),
+        ("tell", {"value": 0.5}, "field 'id' is missing; send {\"id\": ...}, where wanted with value"),
+        ("tell", {"id": 0, "failed": "yes"}, 'failed is "yes"; send true, false, or "rig" in tell.'),
+        ("tell", {"id": 0, "value": 0.5, "reached": {"x": [1]}}, "reached.x is [1]; send a finite number"),
+        ("add", {"parameters": {"x": 0.5}, "value": "1"}, 'value is "1"; send a finite number'),
+        ("ask", {"wroker": "me"}, "field 'wroker' is unknown; did you mean 'worker'?"),
+        ("recommend", {"id": 0}, "field 'id' is unknown."),
+    ],
+)
+def test_wrong_arguments_change_nothing_and_are_told_in_the_words_of_the_service(study, tool, arguments, words):
+    study.ask()
+
+    async def refused():
+        async with Client(model_context_server(study)) as client:
+            return await client.call_tool(tool, arguments), await client.list_tools()
+
+    answer, listed = asyncio.run(refused())
+    assert answer.is_error
+    assert answer.content[0].text.startswith(words)
+    assert [trial.state.name for trial in study.trials()] == ["RUNNING"]
+    assert all(found.input_schema["additionalProperties"] is False for found in listed.tools)
+
+
+def test_objects_as_text_are_taken(study):
+    """Some hosts send them so."""
+    id = study.ask().id
+
+    async def told():
+        async with Client(model_context_server(study)) as client:
+            return await client.call_tool("tell", {"id": id, "value": 1, "reached": '{"x": 0.5}'})
+
+    assert not asyncio.run(told()).is_error
+    assert study.trials()[id].user_attrs[REACHED] == {"x": 0.5}
 
 
 def test_the_command_over_the_standard_streams(study):

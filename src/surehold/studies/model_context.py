@@ -3,6 +3,7 @@
 The same words as over HTTP (`studies.service`), on the standard input and output of the process that the host started.
 """
 
+from collections.abc import Callable
 from typing import Any, Literal
 
 from surehold import __version__
@@ -13,15 +14,17 @@ from surehold.studies.status import rows, status
 try:
     from mcp.server import MCPServer
     from mcp.server.mcpserver.exceptions import ToolError
+    from mcp.server.mcpserver.tools import Tool
+    from pydantic import ConfigDict, ValidationError
 except ImportError:
     require("mcp", "surehold.studies.model_context")
     raise
 
 from surehold.errors import SureholdError
+from surehold.studies import service_messages as wire
+from surehold.studies.wrong_fields import wrong_field
 
 __all__ = ["model_context_server"]
-
-_Value = float | Literal["success", "failure"] | None
 
 _INSTRUCTIONS = """Study '{name}' looks for parameters whose outcome is good and stays good when the input is off. Make
 trials in turn: ask, try the parameters in the real world, tell the value ({direction} it) or that the trial failed.
@@ -33,12 +36,6 @@ def model_context_server(study: RobotStudy) -> MCPServer:
 
     What a study refuses is the error of the tool, in the same words as everywhere.
     """
-    server = MCPServer(
-        f"surehold study {study.name}",
-        instructions=_INSTRUCTIONS.format(name=study.name, direction=study.settings.direction),
-        version=__version__,
-        log_level="WARNING",
-    )
 
     def answered(do: Any, *arguments: Any, **named: Any) -> Any:
         try:
@@ -46,22 +43,21 @@ def model_context_server(study: RobotStudy) -> MCPServer:
         except SureholdError as error:
             raise ToolError(str(error)) from None
 
-    @server.tool()
     def ask(worker: str | None = None) -> dict[str, Any]:
         """Hand out the next trial: its id, parameters and units. The same worker gets one trial until it is told."""
         asked = answered(study.ask, worker)
-        return {"id": asked.id, "parameters": asked.parameters, "units": asked.units, "again": asked.again}
+        found = {"id": asked.id, "parameters": asked.parameters, "units": asked.units, "again": asked.again}
+        return found | ({} if asked.pose is None else {"pose": asked.pose})
 
-    @server.tool()
     def tell(
-        id: int,
-        value: _Value = None,
+        id: wire.Id,
+        value: wire.Value = None,
         failed: bool | Literal["rig"] = False,
-        reached: dict[str, Any] | None = None,
-        constraints: dict[str, float | None] | None = None,
+        reached: wire.Parameters | None = None,
+        constraints: wire.Outputs = None,
         contacts: dict[str, Any] | None = None,
-        successes: int | None = None,
-        of: int | None = None,
+        successes: wire.Count = None,
+        of: wire.Count = None,
     ) -> dict[str, Any]:
         """Say what came of a trial: its value, or that it failed; `reached` are the parameters truly reached.
 
@@ -73,38 +69,69 @@ def model_context_server(study: RobotStudy) -> MCPServer:
         told = answered(study.tell, id, value, **said, successes=successes, of=of)
         return {"id": told.id, "state": told.state, "value": told.value, "already": told.already, "of": told.of}
 
-    @server.tool()
     def recommend() -> dict[str, Any]:
         """Return the trial that still holds when the input is off, with what to expect of it."""
         return answered(study.recommend).as_dict() | {"units": dict(study.settings.units)}
 
-    @server.tool()
     def next_trial() -> dict[str, Any]:
         """Return what would be asked next, and the improvement expected of it, without asking."""
         return {"parameters": answered(study.next), "expected_improvement": answered(study.promise)}
 
-    @server.tool()
     def add(
-        parameters: dict[str, Any],
-        value: _Value = None,
+        parameters: wire.Parameters,
+        value: wire.Value = None,
         failed: bool = False,
-        reached: dict[str, Any] | None = None,
-        constraints: dict[str, float | None] | None = None,
-        successes: int | None = None,
-        of: int | None = None,
+        reached: wire.Parameters | None = None,
+        constraints: wire.Outputs = None,
+        successes: wire.Count = None,
+        of: wire.Count = None,
     ) -> dict[str, Any]:
         """Store a trial that was made without being asked for; its outcome as of tell."""
         said = {"failed": failed, "reached": reached, "constraints": constraints}
         return {"id": answered(study.add, parameters, value, **said, successes=successes, of=of)}
 
-    @server.tool(name="status")
     def state() -> dict[str, Any]:
         """Return the state of the study, its parameters, input noise, and the trials under way."""
         return answered(status, study)
 
-    @server.tool()
     def trials() -> dict[str, Any]:
         """Return all trials."""
         return {"trials": answered(rows, study)}
 
-    return server
+    counted = study.settings.optimizer.get("outcome") == "success"
+    return MCPServer(
+        f"surehold study {study.name}",
+        instructions=_INSTRUCTIONS.format(name=study.name, direction=study.settings.direction),
+        version=__version__,
+        tools=[_tool(do, counted) for do in (ask, tell, recommend, next_trial, add, state, trials)],
+        log_level="WARNING",
+    )
+
+
+class _Tool(Tool):
+    """A tool that says in words what is wrong with its arguments, and nothing before what a study refuses."""
+
+    counted: bool
+    """whether the study is about success"""
+
+    async def run(self, *arguments: Any, **named: Any) -> Any:
+        try:
+            return await super().run(*arguments, **named)
+        except ToolError as error:
+            cause = error.__cause__
+            if isinstance(cause, ToolError):
+                raise cause from None
+            if not isinstance(cause, ValidationError):
+                raise
+            fields = self.fn_metadata.arg_model.model_fields
+            wrong = (wrong_field(found, found["loc"], fields, self.counted) for found in cause.errors())
+            raise ToolError(" ".join(dict(wrong).values())) from None
+
+
+def _tool(do: Callable[..., Any], counted: bool) -> Tool:
+    """Return a function as a tool that refuses unknown arguments, and texts in place of numbers."""
+    made = Tool.from_function(do, name="status" if do.__name__ == "state" else None)
+    parsed = made.fn_metadata.arg_model
+    strict = type(parsed.__name__, (parsed,), {"model_config": ConfigDict(extra="forbid", strict=True)})
+    made.fn_metadata.arg_model = strict
+    return _Tool(**dict(made) | {"parameters": strict.model_json_schema(by_alias=True), "counted": counted})

@@ -1,4 +1,4 @@
-"""What goes over the wire of the HTTP service.
+"""What goes over the wire of the HTTP service, and of what kinds the arguments of the tools for language models are.
 
 Unknown fields, text in place of numbers, and numbers that are not finite are refused.
 """
@@ -12,12 +12,17 @@ __all__ = [
     "Addition",
     "Answer",
     "AskedTrial",
+    "Count",
+    "Id",
     "NextTrial",
+    "Outputs",
+    "Parameters",
     "Problem",
     "Question",
     "Reason",
     "State",
     "Taken",
+    "Value",
     "Veto",
 ]
 
@@ -27,18 +32,18 @@ def _whole(value: Any) -> Any:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-_Id = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=2**31 - 1, description="Of the trial, as ask gave it.")]
+Id = Annotated[int, BeforeValidator(_whole), Field(ge=0, le=2**31 - 1, description="Of the trial, as ask gave it.")]
 _Text = Annotated[str, Field(max_length=500)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
-_Value = Annotated[
+Value = Annotated[
     bool | _Finite | Literal["success", "failure"] | None,
     Field(description="Outcome; of success: true or success, false or failure."),
 ]
-_Count = Annotated[
+Count = Annotated[
     int | None, BeforeValidator(_whole), Field(description="In place of value: successes, of so many executions.")
 ]
-_Outputs = Annotated[dict[str, _Finite | None] | None, Field(description="Further outputs by name.")]
-_Parameters = dict[str, int | _Finite | str | bool | None]
+Outputs = Annotated[dict[str, _Finite | None] | None, Field(description="Further outputs by name.")]
+Parameters = dict[str, int | _Finite | str | bool | None]
 
 
 class _Request(BaseModel):
@@ -74,34 +79,34 @@ class Touches(_Request):
 class Answer(_Request):
     """What came of a trial."""
 
-    id: _Id
-    value: _Value = None
+    id: Id
+    value: Value = None
     failed: Annotated[bool | Literal["rig"], Field(description='"rig": not the place failed; it is asked again.')] = (
         False
     )
-    reached: Annotated[_Parameters | None, Field(description="What was truly reached, where it differs.")] = None
-    constraints: _Outputs = None
-    successes: _Count = None
-    of: _Count = None
+    reached: Annotated[Parameters | None, Field(description="What was truly reached, where it differs.")] = None
+    constraints: Outputs = None
+    successes: Count = None
+    of: Count = None
     touches: Annotated[Touches | None, Field(description="Of a study about an unknown shape.")] = None
 
 
 class Addition(_Request):
     """A trial that was made by hand."""
 
-    parameters: _Parameters
-    value: _Value = None
+    parameters: Parameters
+    value: Value = None
     failed: bool = False
-    reached: _Parameters | None = None
-    constraints: _Outputs = None
-    successes: _Count = None
-    of: _Count = None
+    reached: Parameters | None = None
+    constraints: Outputs = None
+    successes: Count = None
+    of: Count = None
 
 
 class Veto(_Request):
     """A trial that must not be made."""
 
-    id: _Id
+    id: Id
     reason: _Text = ""
 
 
