@@ -1,5 +1,6 @@
 """`surehold grasp --cloud` and `surehold explore`: what a user types and gets."""
 
+import asyncio
 import json
 import sys
 
@@ -118,6 +119,8 @@ def test_no_exploration_replaces_another_and_one_that_cannot_start_leaves_nothin
         ("explore mug --goal fun", "goal 'fun' is unknown"),
         ("explore mug --start half", "start 'half' is unknown"),
         ("explore mug --trials 0", "--trials is 0"),
+        ("explore mug --seed -3", "--seed is -3; give a whole number of 0 or more."),
+        ("explore mug --storage q.log", "--storage q.log is given, but no --study"),
         ("explore mug --noise none", "--noise is none"),
         ("explore mug --cloud bottle.npz", "leave --cloud out"),
         ("explore", "no object is given"),
@@ -125,6 +128,8 @@ def test_no_exploration_replaces_another_and_one_that_cannot_start_leaves_nothin
         ("explore mug --box 0.1,0.1,0.1 --study cup", "and no object"),
         ("explore --box 0.1,0.1 --study cup", "three edges"),
         ("explore --box 80,60,120 --study cup", "in meters"),
+        ("explore --box 0.1,0.1,0.1 --study cup --trials 7", "--trials is of an exploration in simulation"),
+        ("explore --box 0.1,0.1,0.1 --study cup --start view", "--start is of an exploration in simulation"),
     ],
 )
 def test_bad_input_is_one_line(line, said, capsys):
@@ -302,6 +307,29 @@ def test_contacts_are_for_studies_of_a_shape(here, capsys):
     capsys.readouterr()
     assert surehold("study tell rig 0 0.4 --contacts touched.json") == 2
     assert "not about a shape that is touched" in capsys.readouterr().err
+
+
+def test_the_storage_of_the_environment_is_that_of_studies_alone(here, monkeypatch, capsys):
+    monkeypatch.setenv("SUREHOLD_STORAGE", "studies.log")
+    assert surehold("explore --box 0.06,0.06,0.2 --study cup --variables dx,dy --facet right-front") == 0
+    assert surehold("study status cup --storage studies.log") == 0
+    assert surehold("explore mug --noise none") == 2  # not for the storage
+    assert "--noise is none" in capsys.readouterr().err
+
+
+def test_language_models_are_told_the_pose_as_well(here):
+    mcp = pytest.importorskip("mcp.client")
+    from surehold.studies.model_context import model_context_server
+    from surehold.studies.robot import RobotStudy
+
+    assert surehold("explore --box 0.06,0.06,0.2 --study cup --variables dx,dy --facet right-front") == 0
+    study = RobotStudy.open("cup")
+
+    async def asked():
+        async with mcp.Client(model_context_server(study)) as client:
+            return (await client.call_tool("ask", {"worker": "me"})).structured_content
+
+    assert asyncio.run(asked())["pose"] == study.ask("me").pose
 
 
 def test_contacts_come_over_http_as_well(here):

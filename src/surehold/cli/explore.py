@@ -5,29 +5,34 @@ import webbrowser
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
 
 from surehold.amounts import amount
 from surehold.cli.grasp_options import object_of, shown_progress, takes_grasp_options
-from surehold.cli.options import Open, Out, Seed, noise_of
-from surehold.cli.study_options import Storage
+from surehold.cli.options import Open, Out, Seed, StudyStorage, noise_of
 from surehold.errors import InputError, unknown_name
+
+if TYPE_CHECKING:
+    from surehold.cli.session import Kept
 
 __all__ = ["explore"]
 
 _COLUMNS = ("touches", "error, mean [mm]", "error, 95 % [mm]", "deviation, mean [mm]", "believed", "true", "best trial")
 _SHOWN = (0, 5, 10, 20, 40, 80)
 _STARTS = ("box", "view")
+_TRIALS = 20
 _MOST_TRIALS = 500
 
 
 @partial(takes_grasp_options, without=("plan",))  # what is known to be unsure is touched, not averaged
 def explore(
     obj: Annotated[str, typer.Argument(metavar="[OBJECT]", help="mug, bottle, glass, drill, or a mesh file.")] = "",
-    trials: Annotated[int, typer.Option(help="Touches.")] = 20,
+    trials: Annotated[
+        int | None, typer.Option(help=f"Touches in simulation; {_TRIALS} by default.", show_default=False)
+    ] = None,
     start: Annotated[str, typer.Option(help="What is known first: box, or view (of a camera, 1000 points).")] = "box",
     goal: Annotated[str, typer.Option(help="grasp: find a safe one; shape: know the shape.")] = "grasp",
     probe: Annotated[bool, typer.Option("--probe", help="End a trial at the first contact.")] = False,
@@ -42,7 +47,7 @@ def explore(
         str,
         typer.Option(help="Create this study, whose trials a robot makes, of --box or --cloud.", show_default=False),
     ] = "",
-    storage: Storage = "",
+    storage: StudyStorage = "",
     out: Out = "",
     open_page: Open = False,
     **options: Any,
@@ -50,12 +55,14 @@ def explore(
     """Touch an object whose shape is not known, learn it, and end with a grasp: in simulation, or with a robot."""
     from surehold.cli.compilation import announced
     from surehold.cli.folders import folder_of
-    from surehold.cli.session import NO_SUCCESS
+    from surehold.cli.session import NO_SUCCESS, Kept
     from surehold.cli.terminal import terminal
     from surehold.problems.grasp.exploration import GOALS
 
-    if not 1 <= trials <= _MOST_TRIALS:
+    if trials is not None and not 1 <= trials <= _MOST_TRIALS:
         raise InputError(f"--trials is {trials}; give 1 to {_MOST_TRIALS}.")
+    if seed < 0:
+        raise InputError(f"--seed is {seed}; give a whole number of 0 or more.")
     if start not in _STARTS:
         raise unknown_name("start", start, _STARTS)
     if goal not in GOALS:
@@ -66,6 +73,7 @@ def explore(
             f"explore touches a known object in simulation; leave {given} out and give --start view, or name a --study "
             "whose trials a robot makes."
         )
+    kept = Kept(study, storage)
     input_noise = noise_of(noise or "none", "bo")
     if input_noise is None:
         raise InputError("--noise is none; give what the hand strays, such as 0.03.")
@@ -73,10 +81,11 @@ def explore(
     console = terminal()
     described = {"object": obj, **options, "variables": names}
     if study:
-        for option, given in (("--start", start != "box"), ("--probe", probe), ("--out", out), ("--open", open_page)):
+        simulated = {"--trials": trials is not None, "--start": start != "box", "--probe": probe}
+        for option, given in (simulated | {"--out": bool(out), "--open": open_page}).items():
             if given:
                 raise InputError(f"{option} is of an exploration in simulation; a robot's --study goes without it.")
-        console.print(_created(study, storage, described, box, goal, input_noise, seed), markup=False, soft_wrap=True)
+        console.print(_created(kept, described, box, goal, input_noise, seed), markup=False, soft_wrap=True)
         return
     if not obj:
         raise InputError("no object is given; name one to touch in simulation, or a --study with --box or --cloud.")
@@ -84,14 +93,14 @@ def explore(
     with announced(console):
         run = _Run(described, body, start, goal, probe, input_noise, seed)
     folder = folder_of(out, f"explore-{body.name}-seed{seed}")
-    interrupted = False
+    touches, interrupted = trials or _TRIALS, False
     try:
         with shown_progress("touching", console) as progress:
             run.look()
-            for k in range(trials):
+            for k in range(touches):
                 run.touch()
-                progress((k + 1) / trials)
-                if k + 1 in _SHOWN or k + 1 == trials:
+                progress((k + 1) / touches)
+                if k + 1 in _SHOWN or k + 1 == touches:
                     console.print(run.look(), markup=False)
     except KeyboardInterrupt:
         if not len(run.exploration.X):
@@ -100,7 +109,7 @@ def explore(
         run.look()
     path = run.write(folder)
     if interrupted:
-        console.print(f"Interrupted after {len(run.exploration.X)} of {trials} touches; keeping what was done.")
+        console.print(f"Interrupted after {len(run.exploration.X)} of {touches} touches; keeping what was done.")
     console.print(run.answered(), markup=False)
     console.print(f"Page: {path}", markup=False, soft_wrap=True)
     if open_page:
@@ -110,7 +119,7 @@ def explore(
         raise typer.Exit(NO_SUCCESS)
 
 
-def _created(study: str, storage: str, described: dict[str, Any], box: str, goal: str, noise: Any, seed: int) -> str:
+def _created(kept: "Kept", described: dict[str, Any], box: str, goal: str, noise: Any, seed: int) -> str:
     """Create a study of an unknown shape, and return what to do next."""
     from surehold.cli.study_options import quiet
     from surehold.studies.robot import RobotStudy
@@ -131,11 +140,11 @@ def _created(study: str, storage: str, described: dict[str, Any], box: str, goal
     words["facet"] = problem.facet
     units = dict(zip(problem.box.names, problem.units, strict=True))
     made = RobotStudy.create(
-        study, StudySettings(SearchSpace(problem.box), noise, units, {"seed": seed}, {"touch": words}), storage
+        kept.study, StudySettings(SearchSpace(problem.box), noise, units, {"seed": seed}, {"touch": words}), kept.url
     )
     return (
-        f"Created study {study} in {made.storage.shown}. Ask for a trial: surehold study ask {study} --json; tell what "
-        f"it gave and touched: surehold study tell {study} ID VALUE --contacts FILE.json."
+        f"Created study {made.name} in {made.storage.shown}. Ask for a trial: surehold study ask {made.name} --json; "
+        f"tell what it gave and touched: surehold study tell {made.name} ID VALUE --contacts FILE.json."
     )
 
 

@@ -55,6 +55,11 @@ class Kept:
         if self.storage and not self.study:
             raise InputError(f"--storage {self.storage} is given, but no --study; name the study to keep there.")
 
+    @property
+    def url(self) -> str:
+        """Of the storage; empty for the journal of the study."""
+        return self.storage or os.environ.get("SUREHOLD_STORAGE", "")
+
 
 def folder_for(name: str, method: str, seed: int, out: str, study: str = "") -> Path:
     """Return the folder for a run's files, created and writable: `out`, runs/STUDY, or a new one in runs/."""
@@ -267,8 +272,7 @@ def _as_study(
     optimizer = {name: value for name, value in options.items() if name not in others and value is not None}
     space = SearchSpace(problem.box)
     settings = StudySettings(space, options["input_noise"], units, optimizer, kept.problem, options["direction"])
-    storage = kept.storage or os.environ.get("SUREHOLD_STORAGE", "")
-    study = RobotStudy.create(kept.study, settings, storage, resume=True)
+    study = RobotStudy.create(kept.study, settings, kept.url, resume=True)
     if study.paused is not None:
         raise InputError(f"study '{study.name}' is paused ({study.paused}); resume it with: surehold study resume.")
     done = sum(trial.state.is_finished() for trial in study.trials())
