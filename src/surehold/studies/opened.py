@@ -11,6 +11,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError
 from surehold.optimization.limits import limits_of
+from surehold.studies.export_columns import check_columns
 from surehold.studies.ledger import PROMISE, Ledger
 from surehold.studies.settings import SETTINGS, StudySettings
 from surehold.studies.stop_rule import StopRule
@@ -76,8 +77,10 @@ class OpenedStudy:
         Raises
         ------
         InputError
-            If the storage cannot be used, or the study exists and may not be resumed or has other settings.
+            If the storage cannot be used, the study exists and may not be resumed or has other settings, or a parameter
+            has the name of a column of the export.
         """
+        check_columns(settings)
         opened = open_storage(storage, checked_name(name), create=True)
         with opened.closed_on_error(), opened.failures(), opened.handing_out():
             if name not in optuna.get_all_study_names(opened.backend):

@@ -9,6 +9,7 @@ from typing import Any
 from optuna.trial import FrozenTrial, TrialState
 
 from surehold.store.csv_cells import written_cell
+from surehold.studies.export_columns import columns_of
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
 from surehold.studies.ledger import NOTE, VETOED, holder_of
 from surehold.studies.robot import RobotStudy
@@ -52,23 +53,23 @@ def status(study: RobotStudy) -> dict[str, Any]:
 def rows(study: RobotStudy) -> list[dict[str, Any]]:
     """Return one row a trial: id, state, value, further outputs, parameters, what was reached, times, note.
 
-    Of a study about success also "of": of how many executions the value is the share that succeeded.
+    Of a study about success also "of": of how many executions the value is the share that succeeded. The names are
+    those of `export_columns`.
     """
     found = []
-    counted = study.settings.optimizer.get("outcome") == "success"
+    columns = columns_of(study.settings)
     for trial in study.trials():
         parameters, reached = parameters_of(trial), trial.user_attrs.get(REACHED, {})
-        names, outputs = study.settings.space.distributions, trial.user_attrs.get(OUTPUTS, {})
-        holder = holder_of(trial)
+        outputs, holder = trial.user_attrs.get(OUTPUTS, {}), holder_of(trial)
         found.append(
             {
                 "id": trial.number,
                 "state": _state(trial),
                 "value": trial.values[0] if trial.state == TrialState.COMPLETE and trial.values else None,
-                **({"of": trial.user_attrs.get(EXECUTIONS, 1)} if counted else {}),
-                **{f"output_{limit.name}": outputs.get(limit.name) for limit in study.limits},
-                **{name: parameters.get(name) for name in names},
-                **{f"reached_{name}": reached.get(name) for name in names},
+                **({"of": trial.user_attrs.get(EXECUTIONS, 1)} if "of" in columns.outcome else {}),
+                **{column: outputs.get(name) for name, column in columns.outputs.items()},
+                **{column: parameters.get(name) for name, column in columns.parameters.items()},
+                **{column: reached.get(name) for name, column in columns.reached.items()},
                 "begun": trial.datetime_start.isoformat() if trial.datetime_start else None,
                 "finished": trial.datetime_complete.isoformat() if trial.datetime_complete else None,
                 "worker": holder.name if holder is not None else None,
@@ -80,23 +81,8 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
 
 def to_csv(study: RobotStudy) -> str:
     """Return the trials as CSV with a header; an empty field is nothing, texts as in `csv_cells.written_cell`."""
-    names = list(study.settings.space.distributions)
-    of = ["of"] if study.settings.optimizer.get("outcome") == "success" else []
-    columns = [
-        "id",
-        "state",
-        "value",
-        *of,
-        *(f"output_{limit.name}" for limit in study.limits),
-        *names,
-        *(f"reached_{n}" for n in names),
-        "begun",
-        "finished",
-        "worker",
-        "note",
-    ]
     text = io.StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer = csv.DictWriter(text, columns_of(study.settings).all, lineterminator="\n")
     writer.writeheader()
     writer.writerows({column: written_cell(value) for column, value in row.items()} for row in rows(study))
     return text.getvalue()
