@@ -3,12 +3,14 @@ import sqlite3
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor, wait
 
 import optuna
 import pytest
 
 import surehold as sh
 from surehold.errors import InputError
+from surehold.store.locks import locked
 from surehold.studies.dashboard_note import read_note, write_note
 from surehold.studies.robot import RobotStudy
 from surehold.studies.search_space import SearchSpace
@@ -159,6 +161,37 @@ def test_a_file_of_somebody_else_keeps_its_lines(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         RobotStudy.create("mug", SETTINGS, str(path))
     assert path.read_text() == '{"a": 1,\n "b": 2}\n'
+
+
+CREATING = """
+import sys
+from surehold.studies.robot import RobotStudy
+from surehold.studies.search_space import SearchSpace
+from surehold.studies.settings import StudySettings
+sys.stdin.readline()
+RobotStudy.create(sys.argv[2], StudySettings(SearchSpace({"x": (0.0, 1.0)})), sys.argv[1]).close()
+"""
+
+
+def test_studies_are_created_in_a_new_storage_at_the_same_time(url):
+    pipes = {"stdin": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    made = [subprocess.Popen([sys.executable, "-c", CREATING, url, f"study{k}"], **pipes) for k in range(3)]
+    for process in made:  # all at once, when all are loaded
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    errors = [process.communicate(timeout=600)[1] for process in made]
+    assert [process.returncode for process in made] == [0] * 3, errors
+    for k in range(3):
+        RobotStudy.open(f"study{k}", url).close()
+
+
+def test_the_tables_of_a_database_are_made_under_a_lock(tmp_path):
+    with ThreadPoolExecutor(1) as pool:
+        with locked(tmp_path / "a.db.telling"):  # as while another process makes them
+            creation = pool.submit(RobotStudy.create, "mug", SETTINGS, f"sqlite:///{tmp_path}/a.db")
+            wait([creation], 1.0)
+            assert not (tmp_path / "a.db").exists() or not (tmp_path / "a.db").stat().st_size
+        creation.result().close()
 
 
 HOLDING = """

@@ -36,6 +36,7 @@ __all__ = ["JOURNAL", "Storage", "StorageFailure", "checked_name", "open_storage
 JOURNAL: Final = "journal.log"
 _SCHEMES: Final = "a journal file (path or journal:///path), sqlite:///file.db, postgresql://user@host/database, memory"
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_TELLING: Final = ".telling"  # ending of the file that is locked while trials are told
 _SQLITE_PATIENCE: Final = 30.0  # seconds to wait for another process' write; ?timeout= in the URL overrides it
 
 _log = logging.get_logger(__name__)
@@ -65,7 +66,7 @@ class Storage:
         self._engine = engine
         self._asking, self._telling = (
             StudyLock(key, None if beside is None else beside.with_name(beside.name + ending), engine)
-            for key, ending in ((f"surehold:{name}", ".asking"), (f"surehold answers:{name}", ".telling"))
+            for key, ending in ((f"surehold:{name}", ".asking"), (f"surehold answers:{name}", _TELLING))
         )
 
     def handing_out(self) -> AbstractContextManager[None]:
@@ -266,23 +267,25 @@ def _sqlite(url: str, name: str, create: bool) -> Storage:
     except OSError as error:
         raise InputError(f"storage {url!r} cannot be written: {error.strerror or error}.") from None
     arguments: dict[str, Any] = {} if "timeout" in make_url(url).query else {"timeout": _SQLITE_PATIENCE}
-    storage, engine = _database(url, url, {"connect_args": arguments})
+    storage, engine = _database(url, url, {"connect_args": arguments}, path.with_name(path.name + _TELLING))
     return Storage(storage, url, name, path, engine)
 
 
 def _postgresql(driver_url: str, url: str, name: str) -> Storage:
-    storage, engine = _database(driver_url, url, {"pool_pre_ping": True, "connect_args": {"connect_timeout": 10}})
+    arguments = {"pool_pre_ping": True, "connect_args": {"connect_timeout": 10}}
+    storage, engine = _database(driver_url, url, arguments, None)
     return Storage(storage, url, name, None, engine)
 
 
-def _database(driver_url: str, url: str, engine_kwargs: dict[str, Any]) -> tuple[BaseStorage, Any]:
+def _database(driver_url: str, url: str, engine_kwargs: dict[str, Any], lock: Path | None) -> tuple[BaseStorage, Any]:
+    """Return an opened database and its engine; its tables are made where they are missing."""
     from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
     from surehold.studies.columns import ColumnStorage
 
     shown = _without_password(url)
     try:
-        with warnings.catch_warnings():
+        with _alone(driver_url, engine_kwargs, lock), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             storage = ColumnStorage(driver_url, engine_kwargs=engine_kwargs)
     except ArgumentError as error:
@@ -293,6 +296,23 @@ def _database(driver_url: str, url: str, engine_kwargs: dict[str, Any]) -> tuple
     except RuntimeError as error:
         raise InputError(f"storage {shown!r} does not fit this version of Optuna: {error}") from None
     return get_storage(storage), storage.engine
+
+
+@contextmanager
+def _alone(driver_url: str, engine_kwargs: dict[str, Any], lock: Path | None) -> Iterator[None]:
+    """Let nobody else make the tables of a new database meanwhile: by the file `lock`, or by the server."""
+    if lock is not None:
+        with StudyLock("", lock).held():
+            yield
+        return
+    from sqlalchemy import create_engine
+
+    engine = create_engine(driver_url, **engine_kwargs)
+    try:
+        with StudyLock("surehold tables", None, engine).held():
+            yield
+    finally:
+        engine.dispose()
 
 
 def _without_password(url: str) -> str:
