@@ -13,22 +13,18 @@ though a database looks and writes in two steps. It is not held while a model is
 Who needs both takes it second.
 """
 
-import json
-import os
 import re
 import warnings
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, Final
 
-from optuna import logging
 from optuna.exceptions import DuplicatedStudyError, StorageInternalError
 from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, get_storage
-from optuna.storages.journal import BaseJournalBackend, JournalFileBackend
 
 from surehold.errors import InputError
-from surehold.store.locks import file_lock
+from surehold.studies.journal import Journal
 from surehold.studies.study_lock import StudyLock
 
 __all__ = ["JOURNAL", "Storage", "StorageFailure", "checked_name", "open_storage"]
@@ -38,8 +34,6 @@ _SCHEMES: Final = "a journal file (path or journal:///path), sqlite:///file.db, 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _TELLING: Final = ".telling"  # ending of the file that is locked while trials are told
 _SQLITE_PATIENCE: Final = 30.0  # seconds to wait for another process' write; ?timeout= in the URL overrides it
-
-_log = logging.get_logger(__name__)
 
 
 def checked_name(name: str) -> str:
@@ -135,89 +129,6 @@ def open_storage(url: str, name: str, *, create: bool) -> Storage:
 # --- files --------------------------------------------------------------------------------------------------------
 
 
-class _JournalLock:
-    """The lock of a journal's writers, in the form that Optuna asks for.
-
-    Optuna's own locks are files that outlive a killed process; others then wait half a minute. A writer that was killed
-    or ran out of disk in the middle of a line, or a power cut, leaves a line behind that cannot be read; one more line
-    behind it would make the whole journal unreadable. So it is cut off before anything is appended, and said.
-    """
-
-    def __init__(self, journal: Path):
-        self._journal = journal
-        self._lock = file_lock(journal.with_name(f"{journal.name}.lock"))
-
-    def acquire(self) -> bool:
-        self._lock.acquire()
-        try:
-            self._mend()
-        except BaseException:
-            self._lock.release()
-            raise
-        return True
-
-    def release(self) -> None:
-        self._lock.release()
-
-    def mend(self) -> None:
-        """Cut off a damaged last line, if there is one; a line that is just being written is waited for."""
-        with open(self._journal, "rb") as journal:
-            end = journal.seek(0, os.SEEK_END)
-            whole = not end or _is_operation(_line_before(journal, end))
-        if not whole:
-            self.acquire()
-            self.release()
-
-    def _mend(self) -> None:
-        with open(self._journal, "rb+") as journal:
-            size = end = journal.seek(0, os.SEEK_END)
-            last = b""
-            while end and not _is_operation(last := _line_before(journal, end)):
-                end -= len(last)
-            if end == size or (end == 0 and last.endswith(b"\n")):  # whole, or no journal at all: somebody else's file
-                return
-            journal.seek(end)
-            lost = journal.read(100)
-            journal.truncate(end)
-        _log.warning(f"{self._journal}: damaged last line cut off, {size - end} bytes that start with {lost!r}.")
-
-
-class _Journal(BaseJournalBackend):
-    """A journal file that is mended before it is read: not every kind of damage is passed over by Optuna's reader."""
-
-    def __init__(self, path: Path):
-        self._lock = _JournalLock(path)
-        self._file = JournalFileBackend(str(path), lock_obj=self._lock)  # type: ignore[arg-type]
-
-    def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
-        self._lock.mend()
-        return self._file.read_logs(log_number_from)
-
-    def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        self._file.append_logs(logs)
-
-
-def _line_before(file: BinaryIO, end: int) -> bytes:
-    """Return the line of a file that ends at the byte `end`, its newline included where it has one."""
-    length = 4096
-    while True:
-        start = max(0, end - length)
-        file.seek(start)
-        block = file.read(end - start)
-        newline = block.rfind(b"\n", 0, -1)
-        if newline >= 0 or start == 0:
-            return block[newline + 1 :]
-        length *= 2
-
-
-def _is_operation(line: bytes) -> bool:
-    """Tell whether a line of a journal can be read."""
-    try:
-        return line.endswith(b"\n") and "op_code" in json.loads(line)
-    except (ValueError, TypeError, RecursionError):
-        return False
-
-
 def _missing(shown: str, path: Path) -> InputError:
     looked = "" if path.is_absolute() else f" in this folder ({str(path.absolute())!r} was looked for)"
     return InputError(f"storage {shown!r} does not exist{looked}; give --storage, or create the study first.")
@@ -238,7 +149,7 @@ def _journal(path: Path, name: str, create: bool) -> Storage:
     except OSError as error:
         raise InputError(f"storage {str(path)!r} cannot be written: {error.strerror or error}.") from None
     try:
-        backend = JournalStorage(_Journal(path))
+        backend = JournalStorage(Journal(path))
     except OSError as error:
         raise InputError(f"storage {str(path)!r} cannot be used: {error.strerror or error}.") from None
     except (ValueError, OverflowError, KeyError, AssertionError, TypeError, AttributeError, RecursionError) as error:
