@@ -108,6 +108,7 @@ def test_people_by_commands(study):
     assert study("add mug --at dx=0.01,dy=0 0.8")["id"] == 1
     study("pause mug --reason lunch")
     assert study("ask mug", code=1) == {"id": None, "state": "paused", "reason": study("ask mug", code=1)["reason"]}
+    assert study("next mug", code=1) == study("ask mug", code=1)
     study("resume mug")
     assert study("stop mug --trials 3")["stopped"] is False
     study("ask mug")

@@ -20,6 +20,7 @@ from surehold.studies.replay import result_of
 from surehold.studies.robot import NothingToAsk, RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
+from surehold.studies.status import rows, status
 from surehold.studies.stop_rule import StopRule
 
 BOX = sh.Box({"dx": (-0.05, 0.05), "dy": (-0.03, 0.03)})
@@ -215,8 +216,9 @@ def test_pausing(robot):
     asked = robot.ask()
     robot.pause("lunch")
     other = again(robot)
-    with pytest.raises(NothingToAsk, match=r"paused \(lunch\)"):
-        other.ask()
+    for look in (other.ask, other.next):
+        with pytest.raises(NothingToAsk, match=r"paused \(lunch\)"):
+            look()
     other.tell(asked.id, 0.5)
     robot.resume()
     assert other.ask().id == 1
@@ -592,16 +594,46 @@ def test_what_was_read_once_is_read_again_as_if_anew(robot):
 
 def test_a_fault_of_the_rig_teaches_nothing_and_the_trial_is_asked_for_again(robot):
     asked = robot.ask("arm")
+    other = robot.ask("leg")
     assert robot.tell(asked.id, failed="rig").state == "waiting"
+    shown = status(robot)
+    assert (shown["waiting"], shown["running"]) == (1, 1)
+    assert [pending["state"] for pending in shown["pending"]] == ["waiting", "running"]
+    assert shown["pending"][0]["worker_alive"] is None
+    assert [row["state"] for row in rows(robot)] == ["waiting", "running"]
+    assert robot.next() == asked.parameters != other.parameters
     again = robot.ask("another arm")
     assert (again.id, again.parameters, again.again) == (asked.id, asked.parameters, True)
+    assert status(robot)["running"] == 2
+    robot.tell(other.id, 0.25)
     robot.tell(again.id, 0.5)
     for id, arguments in ((again.id, {}), (99, {}), (robot.ask().id, {"value": 1.0})):
         with pytest.raises(InputError):
             robot.tell(id, failed="rig", **arguments)
     with pytest.raises(InputError, match="'machine' is unknown"):
         robot.tell(robot.ask().id, failed="machine")
-    assert [trial.state.name for trial in robot.trials()] == ["COMPLETE", "RUNNING", "RUNNING"]
+    assert [trial.state.name for trial in robot.trials()] == ["COMPLETE", "COMPLETE", "RUNNING", "RUNNING"]
+
+
+def test_what_is_asked_next_is_first_what_a_dead_worker_left(robot):
+    dead = robot.ask("one", lifetime=0.0)
+    time.sleep(0.002)
+    assert robot.next() == dead.parameters
+    shown = status(robot)
+    assert (shown["waiting"], shown["running"], shown["pending"][0]["worker_alive"]) == (1, 0, False)
+    robot.set_stop_rule(StopRule(trials=1))
+    assert robot.next() == dead.parameters  # as ask, which hands it out after the study has stopped
+    assert robot.ask("two", lifetime=60.0).id == dead.id
+    with pytest.raises(NothingToAsk, match="budget"):
+        robot.next()
+
+
+def test_a_trial_that_killed_every_worker_is_not_next(robot):
+    for _ in range(5):
+        dead = robot.ask(lifetime=0.0)
+        time.sleep(0.002)
+    assert robot.next() != dead.parameters
+    assert [t.state for t in robot.trials()] == [TrialState.RUNNING], "a look changed something"
 
 
 def test_what_is_recommended_can_be_commanded(robot):

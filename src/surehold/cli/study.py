@@ -1,6 +1,5 @@
 """`surehold study`: studies that survive, for robots in any language: every command can answer in JSON."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +9,7 @@ import typer
 from surehold.amounts import amount
 from surehold.cli import study_people, study_service
 from surehold.cli.options import Allowed, Constraint, Failures, First, RiskMeasure, Safety, Surrogate
-from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, quiet, say, write_out
+from surehold.cli.study_options import Json, Name, Outputs, Storage, nothing_said, opened, quiet, say, write_out
 
 __all__ = ["studies"]
 
@@ -123,17 +122,9 @@ def ask(
     as_json: Json = False,
 ) -> None:
     """Hand out the next trial: its id and parameters."""
-    from surehold.studies.robot import NothingToAsk
-
     study = opened(name, storage)
-    try:
+    with nothing_said(as_json):
         asked = study.ask(worker or None)
-    except NothingToAsk as nothing:
-        if as_json:
-            typer.echo(
-                json.dumps({"id": None, "state": "paused" if nothing.paused else "stopped", "reason": str(nothing)})
-            )
-        raise
     found = {"id": asked.id, "parameters": asked.parameters, "units": asked.units, "again": asked.again}
     found |= {} if asked.pose is None else {"pose": asked.pose}
     lines = [f"trial {asked.id}{' (handed out again)' * asked.again}"]

@@ -3,7 +3,8 @@
 import json
 import os
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -11,7 +12,7 @@ import typer
 if TYPE_CHECKING:
     from surehold.studies.robot import RobotStudy
 
-__all__ = ["Json", "Name", "Outputs", "Storage", "opened", "quiet", "say", "write_out"]
+__all__ = ["Json", "Name", "Outputs", "Storage", "nothing_said", "opened", "quiet", "say", "write_out"]
 
 Name = Annotated[str, typer.Argument(help="Name of the study.")]
 Storage = Annotated[
@@ -37,6 +38,20 @@ def opened(name: str, storage: str) -> "RobotStudy":
 
     quiet()
     return RobotStudy.open(name, storage)
+
+
+@contextmanager
+def nothing_said(as_json: bool) -> Iterator[None]:
+    """Print as JSON as well why no trial is handed out in the block."""
+    from surehold.studies.robot import NothingToAsk
+
+    try:
+        yield
+    except NothingToAsk as nothing:
+        if as_json:
+            state = "paused" if nothing.paused else "stopped"
+            write_out(json.dumps({"id": None, "state": state, "reason": str(nothing)}) + "\n")
+        raise
 
 
 def quiet() -> None:

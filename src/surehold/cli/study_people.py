@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from surehold.amounts import amount
-from surehold.cli.study_options import Json, Name, Outputs, Storage, opened, say
+from surehold.cli.study_options import Json, Name, Outputs, Storage, nothing_said, opened, say
 from surehold.errors import InputError
 
 __all__ = ["commands"]
@@ -34,7 +34,8 @@ def commands() -> list[tuple[str, Callable[..., Any]]]:
 def next_trial(name: Name, storage: Storage = "", as_json: Json = False) -> None:
     """Show what would be asked next, and what it promises, without asking."""
     study = opened(name, storage)
-    parameters, promise = study.next(), study.promise()
+    with nothing_said(as_json):
+        parameters, promise = study.next(), study.promise()
     lines = [
         "next:",
         *(f"  {key} = {value} {study.settings.units.get(key, '')}".rstrip() for key, value in parameters.items()),

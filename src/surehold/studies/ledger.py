@@ -29,9 +29,11 @@ __all__ = [
     "Ledger",
     "Told",
     "UnknownTrial",
+    "abandoned",
     "answer_of",
     "checked_value",
     "holder_of",
+    "waits",
 ]
 
 #: Trial attributes: who makes the trial (a `Holder`), what the model expected to gain, how the trial came about, why it
@@ -132,13 +134,12 @@ class Ledger:
     def orphan(self, trials: list[FrozenTrial], now: float) -> FrozenTrial | None:
         """Return the first running trial whose holder is dead; one that has killed too many is failed instead."""
         for trial in trials:
-            holder = holder_of(trial) if trial.state == TrialState.RUNNING else None
-            if holder is None or holder.until is None or now <= holder.until:
+            if not abandoned(trial, now):
                 continue
-            if holder.attempts < _ATTEMPTS:
+            if _may_be_made(trial):
                 return trial
             with suppress(UpdateFinishedTrialError):
-                note = f"{holder.attempts} workers died of it; counted as failed"
+                note = f"{_attempts(trial)} workers died of it; counted as failed"
                 self._backend.set_trial_user_attr(trial._trial_id, NOTE, note)
                 self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
         return None
@@ -228,6 +229,26 @@ def holder_of(trial: FrozenTrial) -> Holder | None:
     """Return who makes a trial; None where nobody said."""
     stored = trial.user_attrs.get(HOLDER)
     return None if stored is None else Holder(*stored)
+
+
+def abandoned(trial: FrozenTrial, now: float) -> bool:
+    """Tell whether a trial that was handed out was let go, or its holder is dead."""
+    holder = holder_of(trial) if trial.state == TrialState.RUNNING else None
+    return holder is not None and holder.until is not None and now > holder.until
+
+
+def waits(trial: FrozenTrial, now: float) -> bool:
+    """Tell whether a trial waits to be handed out, for the first time or again."""
+    return trial.state == TrialState.WAITING or (abandoned(trial, now) and _may_be_made(trial))
+
+
+def _attempts(trial: FrozenTrial) -> int:
+    holder = holder_of(trial)
+    return 0 if holder is None else holder.attempts
+
+
+def _may_be_made(trial: FrozenTrial) -> bool:
+    return _attempts(trial) < _ATTEMPTS
 
 
 def answer_of(trial: FrozenTrial) -> str:

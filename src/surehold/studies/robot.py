@@ -16,7 +16,7 @@ from optuna.trial import FrozenTrial, TrialState
 from surehold.errors import InputError, SureholdError, unknown_name
 from surehold.optimization.limits import checked_outputs
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
-from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Told, checked_value, holder_of
+from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Told, checked_value, holder_of, waits
 from surehold.studies.opened import OpenedStudy
 from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend, written
 from surehold.studies.success import answer
@@ -81,9 +81,7 @@ class RobotStudy(OpenedStudy):
         now = time.time()
         until = None if lifetime is None else now + lifetime
         with self.storage.failures(), self.storage.handing_out():
-            reason = self.paused
-            if reason is not None:
-                raise NothingToAsk(f"study '{self.name}' is paused ({reason}); resume it first.", paused=True)
+            self._refuse_paused()
             with self.storage.answering():
                 trials = self._ledger.trials()
                 trial = self._ledger.held(trials, worker) or self._ledger.orphan(trials, now)
@@ -92,13 +90,7 @@ class RobotStudy(OpenedStudy):
                     attempts = 1 if before is None else before.attempts + 1
                     self._ledger.hold(trial, Holder(worker or "", until, attempts))
                     return self._asked(trial, True)
-            reason, promise = self._stop_reason(trials, now)
-            if reason:
-                message = (
-                    f"study '{self.name}' has stopped: {reason}. To go on change its stop rule: "
-                    f"surehold study stop {self.name}, with another --trials, or without options to ask without end."
-                )
-                raise NothingToAsk(message, paused=False)
+            promise = self._refuse_stopped(trials, now)
             holder = Holder(worker or "", until, 1)
             if any(t.state == TrialState.WAITING for t in trials):  # enqueued by Optuna's means
                 with self.storage.answering():  # or a veto of it may be lost
@@ -118,9 +110,21 @@ class RobotStudy(OpenedStudy):
             self._ledger.renew(id, worker, lifetime)
 
     def next(self) -> dict[str, Any]:
-        """Return the parameters that `ask` would hand out as a new trial now, and change nothing."""
+        """Return the parameters that `ask` would hand out now to somebody who holds no trial, and change nothing.
+
+        Raises
+        ------
+        NothingToAsk
+            As `ask` does.
+        """
+        now = time.time()
         with self.storage.failures():
+            self._refuse_paused()
             trials = self._ledger.trials()
+            again = next((t for t in trials if t.state == TrialState.RUNNING and waits(t, now)), None)
+            if again is not None:
+                return parameters_of(again)
+            self._refuse_stopped(trials, now)
             for trial in trials:
                 if trial.state == TrialState.WAITING and self.settings.space.contains(parameters_of(trial)):
                     return parameters_of(trial)
@@ -251,6 +255,22 @@ class RobotStudy(OpenedStudy):
             return self._ledger.trials()
 
     # --- inside ---------------------------------------------------------------------------------------------------
+
+    def _refuse_paused(self) -> None:
+        reason = self.paused
+        if reason is not None:
+            raise NothingToAsk(f"study '{self.name}' is paused ({reason}); resume it first.", paused=True)
+
+    def _refuse_stopped(self, trials: list[FrozenTrial], now: float) -> float | None:
+        """Return what the next trial promises, where the stop rule asks for that."""
+        reason, promise = self._stop_reason(trials, now)
+        if reason:
+            message = (
+                f"study '{self.name}' has stopped: {reason}. To go on change its stop rule: "
+                f"surehold study stop {self.name}, with another --trials, or without options to ask without end."
+            )
+            raise NothingToAsk(message, paused=False)
+        return promise
 
     def _suggested(self, trials: list[FrozenTrial]) -> dict[str, Any]:
         if self._touched is not None:

@@ -11,7 +11,7 @@ from optuna.trial import FrozenTrial, TrialState
 from surehold.store.csv_cells import written_cell
 from surehold.studies.export_columns import columns_of
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
-from surehold.studies.ledger import NOTE, VETOED, holder_of
+from surehold.studies.ledger import NOTE, VETOED, holder_of, waits
 from surehold.studies.robot import RobotStudy
 
 __all__ = ["rows", "status", "to_csv", "to_json"]
@@ -38,7 +38,7 @@ def status(study: RobotStudy) -> dict[str, Any]:
         "state": "paused" if paused is not None else "stopped" if stopped else "open",
         "reason": stopped if paused is None else paused,
         "trials": len(trials),
-        **{name: sum(t.state == state for t in trials) for state, name in _STATES.items()},
+        **{name: sum(_state(t, now) == name for t in trials) for name in _STATES.values()},
         "direction": study.settings.direction,
         "best_value": best,
         "best_trial": next((t.number for t in trials if t.values and t.values[0] == best), None),
@@ -56,7 +56,7 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
     Of a study about success also "of": of how many executions the value is the share that succeeded. The names are
     those of `export_columns`.
     """
-    found = []
+    found, now = [], time.time()
     columns = columns_of(study.settings)
     for trial in study.trials():
         parameters, reached = parameters_of(trial), trial.user_attrs.get(REACHED, {})
@@ -64,7 +64,7 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
         found.append(
             {
                 "id": trial.number,
-                "state": _state(trial),
+                "state": "vetoed" if _vetoed(trial) else _state(trial, now),
                 "value": trial.values[0] if trial.state == TrialState.COMPLETE and trial.values else None,
                 **({"of": trial.user_attrs.get(EXECUTIONS, 1)} if "of" in columns.outcome else {}),
                 **{column: outputs.get(name) for name, column in columns.outputs.items()},
@@ -73,7 +73,7 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
                 "begun": trial.datetime_start.isoformat() if trial.datetime_start else None,
                 "finished": trial.datetime_complete.isoformat() if trial.datetime_complete else None,
                 "worker": holder.name if holder is not None else None,
-                "note": trial.user_attrs.get(VETOED if _state(trial) == "vetoed" else NOTE),
+                "note": trial.user_attrs.get(VETOED if _vetoed(trial) else NOTE),
             }
         )
     return found
@@ -99,19 +99,25 @@ def to_json(study: RobotStudy) -> str:
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
-def _state(trial: FrozenTrial) -> str:
-    return "vetoed" if VETOED in trial.user_attrs and trial.state == TrialState.FAIL else _STATES[trial.state]
+def _state(trial: FrozenTrial, now: float) -> str:
+    """Return the state of a trial; of one that will be handed out again "waiting", as `tell` says."""
+    return "waiting" if waits(trial, now) else _STATES[trial.state]
+
+
+def _vetoed(trial: FrozenTrial) -> bool:
+    return VETOED in trial.user_attrs and trial.state == TrialState.FAIL
 
 
 def _pending(trial: FrozenTrial, now: float) -> dict[str, Any]:
     holder = holder_of(trial)
+    let_go = holder is not None and not holder.attempts  # nobody holds it who could be dead
     begun = trial.datetime_start
     return {
         "id": trial.number,
-        "state": _STATES[trial.state],
+        "state": _state(trial, now),
         "parameters": parameters_of(trial),
         "seconds": None if begun is None else max(now - begun.timestamp(), 0.0),
         "worker": None if holder is None else holder.name or None,
-        "worker_alive": None if holder is None or holder.until is None else now <= holder.until,
+        "worker_alive": None if holder is None or holder.until is None or let_go else now <= holder.until,
         "attempts": None if holder is None else holder.attempts,
     }
