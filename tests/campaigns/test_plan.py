@@ -82,6 +82,11 @@ def test_a_label_that_a_list_of_labels_would_cut_is_refused(cheap):
         replace(cheap, problems={"hill, steep": cheap.problems["hill"]})
 
 
+def test_a_problem_without_a_name_is_refused(cheap):
+    with pytest.raises(InputError, match="in plan 'cheap' is named ''; give it a label"):
+        replace(cheap, problems={"": cheap.problems["hill"]})
+
+
 @pytest.mark.parametrize("text", ["0/2", "3/2", "2", "a/b", "1/0", "1/2/3"])
 def test_bad_shares_are_refused(text):
     with pytest.raises(InputError, match="shard"):

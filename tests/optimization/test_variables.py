@@ -251,3 +251,10 @@ def test_what_nobody_can_command_was_not_tried():
     trial = optimizer.ask_trial()
     optimizer.tell(trial.parameters | {"turn": trial.parameters["turn"] + 0.01}, 1.0)  # what was asked for, rounded
     assert len(optimizer.pending) == 0
+
+
+def test_the_last_level_is_one_that_the_steps_reach():
+    box = Box({"n": (0, 10, "int", "step=3"), "x": (0.0, 1.0, "step=0.3")})
+    found = [box.as_dict(box.from_unit([u, u])) for u in np.linspace(0.0, 1.0, 101)]
+    assert {row["n"] for row in found} == {0, 3, 6, 9}
+    assert sorted({round(row["x"], 9) for row in found}) == [0.0, 0.3, 0.6, 0.9]

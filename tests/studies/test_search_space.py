@@ -9,6 +9,7 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 import surehold as sh
 from surehold.errors import InputError
 from surehold.optimization.noise.input_noise import noise_of_coordinates
+from surehold.studies.parameter_text import parse_search_space
 from surehold.studies.search_space import SearchSpace
 
 DISTRIBUTIONS = {
@@ -154,3 +155,13 @@ def test_bounds_in_single_precision_are_the_bounds():
 def test_a_study_does_not_choose_what_nobody_sets():
     with pytest.raises(InputError, match=r"uncontrolled: payload.*take a surehold\.Optimizer"):
         SearchSpace(sh.Box({"grip": (0.0, 1.0)}, uncontrolled={"payload": [0.2, 0.3, 0.8]}))
+
+
+@pytest.mark.parametrize("box", [sh.Box({"x": (0.0, 1.0, "step=0.3"), "n": (0, 10, "int", "step=3")}), None])
+def test_steps_that_do_not_divide_the_range_keep_their_last_level_and_nothing_is_warned_of(box):
+    space = parse_search_space("x=0:1:step=0.3,n=0:10:int:step=3") if box is None else SearchSpace(box)
+    assert space.distributions == {"x": FloatDistribution(0.0, 0.9, step=0.3), "n": IntDistribution(0, 9, step=3)}
+    last = space.check({"x": 0.9, "n": 9})
+    assert last == pytest.approx({"x": 0.9, "n": 9})
+    assert space.contains(last)
+    assert SearchSpace.from_json(space.to_json()).distributions == space.distributions

@@ -119,6 +119,8 @@ class Plan:
         if not self.problems or not self.methods:
             raise InputError(f"plan '{self.name}' has no {'methods' if self.problems else 'problems'}; name one.")
         for label in (*self.problems, *self.methods):
+            if not label.strip():
+                raise InputError(f"a problem or method in plan '{self.name}' is named {label!r}; give it a label.")
             if "," in label:
                 raise InputError(
                     f"label '{label}' in plan '{self.name}' has a comma, which separates labels; leave it out."

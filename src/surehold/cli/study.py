@@ -13,6 +13,8 @@ from surehold.cli.study_options import Json, Name, Outputs, Storage, nothing_sai
 
 __all__ = ["studies"]
 
+_NOISE = "0.03"
+
 
 def studies() -> typer.Typer:
     """Return the group of commands."""
@@ -48,9 +50,13 @@ def create(
         ),
     ] = "",
     noise: Annotated[
-        str,
-        typer.Option(help="Input noise: a share of every range (0.03), or NAME=DEVIATION,... in their units, or none."),
-    ] = "0.03",
+        str | None,
+        typer.Option(
+            help=f"Input noise: a share of every range ({_NOISE} by default), or NAME=DEVIATION,... in their units, or "
+            "none.",
+            show_default=False,
+        ),
+    ] = None,
     units: Annotated[str, typer.Option(help="NAME=UNIT,..., such as dx=m,turn=rad.", show_default=False)] = "",
     problem: Annotated[
         str,
@@ -99,9 +105,11 @@ def create(
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
     optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
     optimizer |= limits_given(constraint, allowed, feasible, failures, safety, first)
-    input_noise = None if noise.strip().lower() == "none" else noise_of(noise, "bo")
+    input_noise = noise_of(_NOISE if noise is None else noise, "bo")
     if space.box is None or space.box.numbers is None:
-        input_noise = None  # choices carry none
+        if input_noise is not None and noise is not None:
+            raise InputError(f"--noise is {noise}, but all parameters are choices, which carry none; leave it out.")
+        input_noise = None
     if input_noise is None and "risk" in optimizer:
         raise InputError(f"--risk {risk} is of the outcome under input noise, and there is none; give --noise.")
     settings = StudySettings(
@@ -160,8 +168,13 @@ def tell(
 ) -> None:
     """Tell what came of a trial; the same answer twice is harmless, another one is refused."""
     from surehold.cli.options import numbers_given
+    from surehold.errors import InputError
     from surehold.studies.parameter_text import parse_assignments
 
+    if failed and rig:
+        raise InputError(
+            "--failed says that the place gave nothing, --rig that it is not at fault; give one of the two."
+        )
     places = parse_assignments(reached, "--reached") if reached else None
     outputs = numbers_given(constraints)
     touched = None

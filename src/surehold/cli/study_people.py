@@ -90,7 +90,9 @@ def stop(
     improvement: Annotated[
         float | None, typer.Option(help="When no trial promises such an improvement under the input noise ...")
     ] = None,
-    asks: Annotated[int, typer.Option(help="... so many times in a row.")] = 3,
+    asks: Annotated[
+        int | None, typer.Option(help="... so many times in a row; 3 by default.", show_default=False)
+    ] = None,
     storage: Storage = "",
     as_json: Json = False,
 ) -> None:
@@ -100,8 +102,10 @@ def stop(
     study = opened(name, storage)
     if hours is not None and not 0.0 < hours < 1e6:
         raise InputError(f"--hours is {hours:g}; give a number above 0, such as 8.")
+    if asks is not None and improvement is None:
+        raise InputError(f"--asks {asks} is how often trials promise less than --improvement; give that, too.")
     until = None if hours is None else time.time() + 3600.0 * hours
-    study.set_stop_rule(StopRule(trials, until, improvement, asks))
+    study.set_stop_rule(StopRule(trials, until, improvement, **({} if asks is None else {"asks": asks})))
     reason = study.stopped()
     found = {"name": name, "stop_rule": study.stop_rule.as_dict(), "stopped": bool(reason), "reason": reason}
     say(found, f"study {name}: {'stopped, ' + reason if reason else f'open, {study.stop_rule}'}", as_json)

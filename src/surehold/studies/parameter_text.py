@@ -3,10 +3,7 @@
 Choices are separated by "/", which needs no quotes in a shell, or by "|".
 """
 
-from collections.abc import Mapping
 from typing import Any
-
-from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 
 from surehold.errors import InputError
 from surehold.studies.search_space import SearchSpace
@@ -30,7 +27,7 @@ def parse_search_space(text: str) -> SearchSpace:
     >>> space.distributions["fingers"]
     IntDistribution(high=5, log=False, low=2, step=1)
     """
-    parameters: dict[str, BaseDistribution] = {}
+    parameters: dict[str, Any] = {}
     for part in text.split(","):
         name, equals, described = (piece.strip() for piece in part.partition("="))
         if not equals or not name or not described:
@@ -38,10 +35,8 @@ def parse_search_space(text: str) -> SearchSpace:
         if name in parameters:
             raise InputError(f"parameter {name!r} is named twice; give each once.")
         try:
-            parameters[name] = _distribution(name, described)
+            parameters[name] = _described(described)
         except ValueError as error:
-            if isinstance(error, InputError):
-                raise
             raise InputError(f"parameter {part.strip()!r} is not understood ({error}); {_FORM}.") from None
     return SearchSpace(parameters)
 
@@ -59,10 +54,11 @@ def parse_assignments(text: str, what: str) -> dict[str, str]:
     return found
 
 
-def _distribution(name: str, described: str) -> BaseDistribution:
+def _described(described: str) -> list[Any] | tuple[Any, ...]:
+    """Return what `SearchSpace` takes for the bounds, or the choices, of one parameter."""
     for between in ("|", "/"):  # "/" needs no quotes in a shell; with "|", choices may hold a "/"
         if between in described:
-            return CategoricalDistribution([choice.strip() for choice in described.split(between)])
+            return [choice.strip() for choice in described.split(between)]
     lower, *rest = described.split(":")
     if not rest:
         try:
@@ -70,23 +66,13 @@ def _distribution(name: str, described: str) -> BaseDistribution:
         except ValueError:
             raise ValueError(f"{described!r} is neither a range nor a choice of several") from None
         raise ValueError("one number is no range")
-    options: Mapping[str, Any] = dict(_option(option.strip()) for option in rest[1:])
-    whole, log = bool(options.get("int")), bool(options.get("log"))
-    number = int if whole else float
-    low, high, step = number(lower), number(rest[0]), options.get("step")
-    if not low < high:
-        raise InputError(
-            f"bounds of '{name}' are ({low}, {high}); lower must be smaller than upper: swap or widen them."
-        )
-    if whole:
-        return IntDistribution(int(low), int(high), log=log, step=1 if step is None else int(step))
-    return FloatDistribution(low, high, log=log, step=None if step is None else float(step))
+    options = [_checked_option(option.strip()) for option in rest[1:]]
+    number = int if "int" in options else float
+    return number(lower), number(rest[0]), *options
 
 
-def _option(text: str) -> tuple[str, Any]:
+def _checked_option(text: str) -> str:
     name, _, value = text.partition("=")
-    if name in ("int", "log") and not value:
-        return name, True
-    if name == "step" and value:
-        return name, value
+    if (name in ("int", "log") and not value) or (name == "step" and value):
+        return text
     raise ValueError(f"{text!r} is none of log, int, step=...")

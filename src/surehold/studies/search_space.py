@@ -6,6 +6,7 @@ Parameters that can take one value only are left out of the box; what the others
 
 import json
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
 from typing import Any, Final
 
 import numpy as np
@@ -163,9 +164,11 @@ def _distribution(name: str, value: Any) -> BaseDistribution:
         return CategoricalDistribution(variable.choices)
     if variable.integer:
         return IntDistribution(int(variable.low), int(variable.high), log=variable.log, step=int(variable.step))
-    return _distribution(
-        name, FloatDistribution(variable.low, variable.high, log=variable.log, step=variable.step or None)
-    )
+    high = variable.high
+    if variable.step:  # as Optuna counts, in decimals: else it takes the last level for outside, and warns
+        levels = round((high - variable.low) / variable.step)
+        high = float(Decimal(str(variable.low)) + levels * Decimal(str(variable.step)))
+    return _distribution(name, FloatDistribution(variable.low, high, log=variable.log, step=variable.step or None))
 
 
 def _variable(name: str, distribution: BaseDistribution) -> Variable:
