@@ -411,6 +411,13 @@ def test_a_full_output_does_not_end_the_run(here):
     assert (here / "full" / "report.html").is_file()
 
 
+def test_an_output_that_is_closed_does_not_end_the_run(here, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stdout", None)  # as Python starts with >&-
+    assert surehold("maximize own.py:hill --bounds a=0:1 --trials 8 --initial 6 --out closed") == 0
+    assert (here / "closed" / "report.html").is_file()
+    assert capsys.readouterr().err == ""
+
+
 def test_output_in_ascii(here):
     line = [sys.executable, "-m", "surehold", "maximize", "gf", "--trials", "22", "--out", "plain"]
     done = subprocess.run(line, capture_output=True, env={**os.environ, "PYTHONIOENCODING": "ascii"}, check=False)

@@ -98,3 +98,17 @@ def test_what_does_not_fit_is_one_line(line, words, capsys):
     assert words in message
     assert captured.err.count("error:") == 1
     assert "Traceback" not in captured.err
+
+
+def test_a_scene_or_an_exploration_that_is_interrupted_leaves_no_empty_folder(here, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("surehold.cli.scene._best", interrupted)
+    monkeypatch.setattr("surehold.cli.explore._Run.look", interrupted)
+    (here / "mine").mkdir()
+    for line in ("scene mug --facet right-front", "scene mug --facet right-front --out mine", "explore mug"):
+        assert surehold(line) == 130
+    assert list((here / "runs").iterdir()) == []
+    assert (here / "mine").is_dir()
+    assert "interrupted" in capsys.readouterr().err

@@ -229,13 +229,14 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("create a --parameters dx=0", "not understood"),
         ("create a --parameters dx=0:1:cubic", "none of log, int"),
         ("create a --parameters dx=0:1,dx=0:2", "named twice"),
-        ("create a --parameters dx=0:1:log", "logarithmic variable is positive"),
+        ("create a --parameters dx=0:1:log", "not understood .a logarithmic range lies above 0"),
         ("create a --parameters dx=a/a", "each can be there once"),
         ("create a --parameters dx=0:1:step=2", "wider than its range"),
-        ("create a --parameters dx=0:1:step=0", "'step=0'"),
+        ("create a --parameters dx=0:1:step=0", "a step of 0 leads nowhere.; write NAME="),
+        ("create a --parameters dx=0:1:step=z", "not understood"),
         ("create a --parameters grip=a/b --noise grip=0.1", "--noise is grip=0.1, but all parameters are choices"),
         ("create a --parameters value=0:1", "parameter 'value' has the name of a column"),
-        ("create a --parameters dx=0.5:3:int", "not understood"),
+        ("create a --parameters dx=0.5:3:int", "give whole numbers"),
         ("create a --parameters dx=0:inf", "not understood|finite"),
         ("create a --parameters dx=0:1 --noise dy=0.1", "'dy' is unknown"),
         ("create a --parameters dx=0:1 --units dz=m", "'dz'"),
@@ -274,7 +275,7 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("recommend mug", "no trial has given a value yet"),
         ("work mug", "says nothing about what its trials are"),
         ("serve mug --token-file own.py", "chmod 600"),
-        ("create new --parameters n=0:1" + "0" * 400 + ":int", "give two numbers"),
+        ("create new --parameters n=0:1" + "0" * 400 + ":int", "both must be finite numbers"),
         ("create new --parameters x=0:1e308", "bounds are finite numbers up to 1e.100"),
         ("create new --parameters x=0:1 --initial 1000000000", "100,000 trials at most"),
         ("tell mug 0 1e308", "another unit"),
@@ -493,3 +494,14 @@ def test_an_output_that_could_not_be_measured(study):
     study("tell press 0 0.3 --constraints force=none")
     study("add press 0.2 --at x=0.4 --constraints force=0.1")
     assert study("recommend press")["trial"] == 1
+
+
+def test_an_answer_that_nobody_can_hear_is_an_error_in_words(study, monkeypatch, capsys):
+    study(CREATE)
+    capsys.readouterr()
+    with monkeypatch.context() as closed:
+        closed.setattr(sys, "stdout", None)  # as Python starts with >&-
+        for line in ("ask mug", "status mug --json", "export mug"):
+            assert run(["study", *line.split()]) == 1
+            assert "the answer cannot be written (the standard output is closed)" in capsys.readouterr().err
+    assert study("status mug")["running"] == 1, "what was stored before is kept"

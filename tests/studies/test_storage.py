@@ -1,3 +1,4 @@
+import errno
 import os
 import sqlite3
 import subprocess
@@ -7,14 +8,17 @@ from concurrent.futures import ThreadPoolExecutor, wait
 
 import optuna
 import pytest
+from filelock import FileLock
 
 import surehold as sh
 from surehold.errors import InputError
 from surehold.store.locks import locked
+from surehold.studies import storage as storage_module
 from surehold.studies.dashboard_note import read_note, write_note
 from surehold.studies.robot import RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
+from surehold.studies.status import rows, status
 from surehold.studies.storage import open_storage
 
 SETTINGS = StudySettings(SearchSpace({"x": (0.0, 1.0)}), optimizer={"n_initial": 4})
@@ -68,6 +72,36 @@ def test_storages_without_permission(tmp_path):
     tmp_path.chmod(0o500)
     with pytest.raises(InputError, match="cannot be written"):
         RobotStudy.create("mug", SETTINGS, str(tmp_path / "journal.log"))
+
+
+@pytest.mark.parametrize("url", ["{}/journal.log", "sqlite:///{}/a b%20.db"])
+def test_what_cannot_be_written_is_read(url, tmp_path, monkeypatch):
+    """A copy on a medium that is mounted for reading; the tests may run as root, who writes everywhere."""
+    url = url.format(tmp_path)
+    robot = RobotStudy.create("mug", SETTINGS, url)
+    robot.tell(robot.ask().id, 0.5)
+    robot.close()
+    for file in tmp_path.iterdir():
+        if file.suffix in (".lock", ".asking", ".telling"):
+            file.unlink()
+
+    def read_only(path, mode):
+        if mode != "rb":
+            raise OSError(errno.EROFS, "Read-only file system")
+        return open(path, mode)
+
+    monkeypatch.setattr(storage_module, "open", read_only, raising=False)
+    before = sorted(tmp_path.iterdir())
+    copy = RobotStudy.open("mug", url)
+    assert (status(copy)["complete"], [row["value"] for row in rows(copy)]) == (1, [0.5])
+    assert copy.recommend(write=False).trial == 0
+    assert sorted(tmp_path.iterdir()) == before
+    monkeypatch.setattr(FileLock, "acquire", lambda *_, **__: read_only("", "ab"))
+    with pytest.raises(InputError, match="Read-only file system; copy it to a place that can be written"):
+        copy.ask()
+    with pytest.raises(InputError, match="cannot be written: Read-only file system"):
+        RobotStudy.create("other", SETTINGS, url)
+    copy.close()
 
 
 @pytest.mark.parametrize("text", ["hello", "hello\n", '{"op_code": 99}\n', '{"op_code": 0}\n', "[1]", "\0\0\n"])

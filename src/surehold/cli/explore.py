@@ -54,7 +54,7 @@ def explore(
 ) -> None:
     """Touch an object whose shape is not known, learn it, and end with a grasp: in simulation, or with a robot."""
     from surehold.cli.compilation import announced
-    from surehold.cli.folders import folder_of
+    from surehold.cli.folders import folder_of, removed_on_error
     from surehold.cli.session import NO_SUCCESS, Kept
     from surehold.cli.terminal import terminal
     from surehold.problems.grasp.exploration import GOALS
@@ -93,21 +93,22 @@ def explore(
     with announced(console):
         run = _Run(described, body, start, goal, probe, input_noise, seed)
     folder = folder_of(out, f"explore-{body.name}-seed{seed}")
-    touches, interrupted = trials or _TRIALS, False
-    try:
-        with shown_progress("touching", console) as progress:
+    with removed_on_error(folder):
+        touches, interrupted = trials or _TRIALS, False
+        try:
+            with shown_progress("touching", console) as progress:
+                run.look()
+                for k in range(touches):
+                    run.touch()
+                    progress((k + 1) / touches)
+                    if k + 1 in _SHOWN or k + 1 == touches:
+                        console.print(run.look(), markup=False)
+        except KeyboardInterrupt:
+            if not len(run.exploration.X):
+                raise
+            interrupted = True
             run.look()
-            for k in range(touches):
-                run.touch()
-                progress((k + 1) / touches)
-                if k + 1 in _SHOWN or k + 1 == touches:
-                    console.print(run.look(), markup=False)
-    except KeyboardInterrupt:
-        if not len(run.exploration.X):
-            raise
-        interrupted = True
-        run.look()
-    path = run.write(folder)
+        path = run.write(folder)
     if interrupted:
         console.print(f"Interrupted after {len(run.exploration.X)} of {touches} touches; keeping what was done.")
     console.print(run.answered(), markup=False)

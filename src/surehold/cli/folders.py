@@ -1,11 +1,13 @@
 """Where the files of a command go."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from surehold.store.atomic import checked_folder, new_folder
 
-__all__ = ["folder_of"]
+__all__ = ["folder_of", "removed_on_error"]
 
 
 def folder_of(out: str, name: str) -> Path:
@@ -18,3 +20,15 @@ def folder_of(out: str, name: str) -> Path:
         return checked_folder(out)
     slug = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "run"
     return new_folder(Path("runs") / slug)
+
+
+@contextmanager
+def removed_on_error(folder: Path) -> Iterator[None]:
+    """Remove a command's folder in runs/ where the block fails before anything was written into it."""
+    try:
+        yield
+    except BaseException:
+        if folder.parent == Path("runs"):
+            with suppress(OSError):  # it is not empty
+                folder.rmdir()
+        raise

@@ -36,7 +36,7 @@ def scene(
 ) -> None:
     """Browse objects, facets and modes: the best of 45 grasps in each, as a page, JSON and a picture."""
     from surehold.cli.compilation import announced
-    from surehold.cli.folders import folder_of
+    from surehold.cli.folders import folder_of, removed_on_error
     from surehold.cli.terminal import terminal
     from surehold.grasping.object.shipped import OBJECTS
     from surehold.grasping.pictures.scene import grasp_scene
@@ -57,63 +57,66 @@ def scene(
     if facet:
         _modes(facet)  # explains an unknown one at once
     folder = folder_of(out, f"scene-{Path(obj).stem or 'objects'}")
-    views, notes, rows, data = [], [], [], []
-    best = -np.inf
-    picture = None
-    for name in [obj] if obj else OBJECTS:
-        described = {**words, "object": name}
-        body = object_of(described, console)
-        for mode in _modes(facet or ("all" if quick else default_facet(body))):
-            with announced(console), shown_progress(f"{body.name}, {mode}", console) as progress:
-                problem = described_grasp({**described, "facet": mode}, body, progress)
-            x, outcome, free = _best(problem)
-            drawn = gather.drawn_scene(grasp_scene(problem.simulator, outcome))
-            label = f"{body.name}, {mode}"
-            views.append(Candidate(label, x, outcome.quality, scene=drawn))
-            shares = f"{100.0 * free:.0f} % of {_ALONG * _ACROSS}"
-            notes.append(
-                f"{label}: {outcome.status}, quality {outcome.quality:.3f} with "
-                f"{amount(len(outcome.contacts), 'contact')}; {shares} poses start free of collision."
-            )
-            default = problem.default
-            place = f"{1e3 * x[0]:.0f}, {1e3 * x[1]:.0f}"
-            rows.append(
-                (
-                    body.name,
-                    mode,
-                    f"{1e3 * default.standoff:.1f}",
-                    f"{default.s1:.2f}",
-                    place,
-                    outcome.status,
-                    f"{outcome.quality:.3f}",
-                    str(len(outcome.contacts)),
-                    shares,
+    with removed_on_error(folder):
+        views, notes, rows, data = [], [], [], []
+        best = -np.inf
+        picture = None
+        for name in [obj] if obj else OBJECTS:
+            described = {**words, "object": name}
+            body = object_of(described, console)
+            for mode in _modes(facet or ("all" if quick else default_facet(body))):
+                with announced(console), shown_progress(f"{body.name}, {mode}", console) as progress:
+                    problem = described_grasp({**described, "facet": mode}, body, progress)
+                x, outcome, free = _best(problem)
+                drawn = gather.drawn_scene(grasp_scene(problem.simulator, outcome))
+                label = f"{body.name}, {mode}"
+                views.append(Candidate(label, x, outcome.quality, scene=drawn))
+                shares = f"{100.0 * free:.0f} % of {_ALONG * _ACROSS}"
+                notes.append(
+                    f"{label}: {outcome.status}, quality {outcome.quality:.3f} with "
+                    f"{amount(len(outcome.contacts), 'contact')}; {shares} poses start free of collision."
                 )
-            )
-            data.append({"object": body.name, "mode": mode, "default": default, "free": free, "x": x, "grasp": outcome})
-            if outcome.quality > best:
-                best, picture = outcome.quality, drawn
-    text = (
-        f"Hand {gripper.name}. Of each mode, the facet that the palm faces and the one at the thumb, the best of "
-        f"{_ALONG * _ACROSS} grasps around the default pose. The slider closes the fingers."
-    )
-    page = render_scenes("Objects, facets and modes", text, views, notes, _COLUMNS, rows)
-    write_file(folder / "scene.html", page)
-    plain = grasp_to_dict({"hand": gripper.name, "grasps": data})
-    write_file(folder / "scene.json", json.dumps(plain, indent=1, allow_nan=False) + "\n")
-    drawn_by = "nothing"
-    if picture is not None:
-        png, drawn_by = still_picture(picture)
-        write_file(folder / "scene.png", png)
-    closed = sum(row[5] == "ok" for row in rows)
-    console.print(
-        f"{len(rows)} mode{'s' if len(rows) != 1 else ''}, {closed} with a grasp that closes; the best is worth "
-        f"{best:.3f}. Picture by {drawn_by}. Page: {folder / 'scene.html'}",
-        markup=False,
-        soft_wrap=True,
-    )
-    if open_page:
-        webbrowser.open((folder / "scene.html").resolve().as_uri())
+                default = problem.default
+                place = f"{1e3 * x[0]:.0f}, {1e3 * x[1]:.0f}"
+                rows.append(
+                    (
+                        body.name,
+                        mode,
+                        f"{1e3 * default.standoff:.1f}",
+                        f"{default.s1:.2f}",
+                        place,
+                        outcome.status,
+                        f"{outcome.quality:.3f}",
+                        str(len(outcome.contacts)),
+                        shares,
+                    )
+                )
+                data.append(
+                    {"object": body.name, "mode": mode, "default": default, "free": free, "x": x, "grasp": outcome}
+                )
+                if outcome.quality > best:
+                    best, picture = outcome.quality, drawn
+        text = (
+            f"Hand {gripper.name}. Of each mode, the facet that the palm faces and the one at the thumb, the best of "
+            f"{_ALONG * _ACROSS} grasps around the default pose. The slider closes the fingers."
+        )
+        page = render_scenes("Objects, facets and modes", text, views, notes, _COLUMNS, rows)
+        write_file(folder / "scene.html", page)
+        plain = grasp_to_dict({"hand": gripper.name, "grasps": data})
+        write_file(folder / "scene.json", json.dumps(plain, indent=1, allow_nan=False) + "\n")
+        drawn_by = "nothing"
+        if picture is not None:
+            png, drawn_by = still_picture(picture)
+            write_file(folder / "scene.png", png)
+        closed = sum(row[5] == "ok" for row in rows)
+        console.print(
+            f"{len(rows)} mode{'s' if len(rows) != 1 else ''}, {closed} with a grasp that closes; the best is worth "
+            f"{best:.3f}. Picture by {drawn_by}. Page: {folder / 'scene.html'}",
+            markup=False,
+            soft_wrap=True,
+        )
+        if open_page:
+            webbrowser.open((folder / "scene.html").resolve().as_uri())
 
 
 def _modes(text: str) -> list[str]:

@@ -4,7 +4,7 @@ import os
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from rich.table import Table
 
 from surehold.amounts import amount
 from surehold.cli.compilation import announced, warm_up
-from surehold.cli.folders import folder_of
+from surehold.cli.folders import folder_of, removed_on_error
 from surehold.cli.interruption import terminable, undisturbed
 from surehold.cli.options import METHODS, REQUERIES
 from surehold.cli.requeries import requeried
@@ -123,7 +123,7 @@ def run_session(
     """
     console = console or terminal()
     started = time.perf_counter()
-    with terminable() as ended, _new_folder_removed_on_error(folder):
+    with terminable() as ended, removed_on_error(folder):
         for name, count, least in (("trials", trials, 1), ("initial", initial, 1), ("requeries", requeries, 0)):
             if count < least:
                 raise InputError(f"--{name} is {count}; give {least} or more.")
@@ -226,18 +226,6 @@ def run_session(
     if open_report:
         webbrowser.open(path.resolve().as_uri())
     return report
-
-
-@contextmanager
-def _new_folder_removed_on_error(folder: Path) -> Iterator[None]:
-    """Remove the run's folder in runs/ where the block fails before anything was written into it."""
-    try:
-        yield
-    except BaseException:
-        if folder.parent == Path("runs"):
-            with suppress(OSError):  # it is not empty
-                folder.rmdir()
-        raise
 
 
 def _with_progress(

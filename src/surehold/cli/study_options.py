@@ -5,7 +5,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -30,6 +30,9 @@ Outputs = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Answer in JSON, one object.")]
+
+
+_UNHEARD: Final = "the answer cannot be written ({}); what was stored before is kept, see: surehold study status."
 
 
 def opened(name: str, storage: str) -> "RobotStudy":
@@ -77,6 +80,8 @@ def write_out(text: str) -> None:
     from surehold.cli.terminal import speak_plainly
     from surehold.errors import SureholdError
 
+    if sys.stdout is None:  # closed before the start, by >&-
+        raise SureholdError(_UNHEARD.format("the standard output is closed"))
     speak_plainly()
     try:
         sys.stdout.write(text)
@@ -84,7 +89,4 @@ def write_out(text: str) -> None:
     except OSError as error:
         with suppress(OSError):  # or Python complains when it flushes at exit
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise SureholdError(
-            f"the answer cannot be written ({error.strerror or error}); what was stored before is kept, see: surehold "
-            "study status."
-        ) from None
+        raise SureholdError(_UNHEARD.format(error.strerror or error)) from None

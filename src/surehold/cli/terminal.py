@@ -16,29 +16,29 @@ _PLAIN: Final = {"–": "-", "—": "-", "±": "+/-", "°": " deg", "µ": "u", "
 class _Patient:
     """The standard output, after whose failure (a closed pipe, a full disk) nothing is written to it any more."""
 
-    def __init__(self, stream: IO[str]):
+    def __init__(self, stream: IO[str] | None):
         self._stream = stream
-        self._lost = False
+        self._lost = stream is None  # it was closed before the start
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        if not self._lost:
+        if self._stream is not None and not self._lost:
             try:
                 return self._stream.write(text)
             except OSError as error:
-                self._lose(error)
+                self._lose(self._stream, error)
         return len(text)
 
     def flush(self) -> None:
-        if not self._lost:
+        if self._stream is not None and not self._lost:
             try:
                 self._stream.flush()
             except OSError as error:
-                self._lose(error)
+                self._lose(self._stream, error)
 
-    def _lose(self, error: OSError) -> None:
+    def _lose(self, stream: IO[str], error: OSError) -> None:
         self._lost = True
         if not isinstance(error, BrokenPipeError):  # who closes a pipe knows it
             reason = f"{error.strerror or error}"
@@ -50,7 +50,7 @@ class _Patient:
                 )
         with suppress(OSError):  # or Python complains when it flushes at exit
             nothing = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nothing, self._stream.fileno())
+            os.dup2(nothing, stream.fileno())
             os.close(nothing)
 
 

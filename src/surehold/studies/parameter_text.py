@@ -67,12 +67,18 @@ def _described(described: str) -> list[Any] | tuple[Any, ...]:
             raise ValueError(f"{described!r} is neither a range nor a choice of several") from None
         raise ValueError("one number is no range")
     options = [_checked_option(option.strip()) for option in rest[1:]]
-    number = int if "int" in options else float
-    return number(lower), number(rest[0]), *options
+    low, high = float(lower), float(rest[0])
+    if "log" in options and not low > 0.0:
+        raise ValueError("a logarithmic range lies above 0")
+    return low, high, *options
 
 
 def _checked_option(text: str) -> str:
     name, _, value = text.partition("=")
-    if (name in ("int", "log") and not value) or (name == "step" and value):
+    if name in ("int", "log") and not value:
+        return name
+    if name == "step" and value:
+        if not float(value) > 0.0:
+            raise ValueError(f"a step of {value} leads nowhere")
         return text
     raise ValueError(f"{text!r} is none of log, int, step=...")

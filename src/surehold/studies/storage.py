@@ -13,12 +13,14 @@ though a database looks and writes in two steps. It is not held while a model is
 Who needs both takes it second.
 """
 
+import errno
 import re
 import warnings
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import quote
 
 from optuna.exceptions import DuplicatedStudyError, StorageInternalError
 from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, get_storage
@@ -33,6 +35,7 @@ JOURNAL: Final = "journal.log"
 _SCHEMES: Final = "a journal file (path or journal:///path), sqlite:///file.db, postgresql://user@host/database, memory"
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _TELLING: Final = ".telling"  # ending of the file that is locked while trials are told
+_READ_ONLY: Final = (errno.EACCES, errno.EPERM, errno.EROFS)  # what the system says of a file that it does not write
 _SQLITE_PATIENCE: Final = 30.0  # seconds to wait for another process' write; ?timeout= in the URL overrides it
 
 
@@ -83,7 +86,8 @@ class Storage:
             reason = str(getattr(cause, "orig", None) or cause).strip().splitlines()[0]
             raise StorageFailure(f"storage {self.shown} cannot be used: {reason}. Nothing was changed.") from error
         except OSError as error:
-            raise StorageFailure(f"storage {self.shown} cannot be used: {error.strerror or error}.") from error
+            hint = "; copy it to a place that can be written" if error.errno in _READ_ONLY else ""
+            raise StorageFailure(f"storage {self.shown} cannot be used: {error.strerror or error}{hint}.") from error
         except DuplicatedStudyError:
             raise InputError(f"the study exists in {self.shown} already; use it, or choose another name.") from None
 
@@ -134,15 +138,30 @@ def _missing(shown: str, path: Path) -> InputError:
     return InputError(f"storage {shown!r} does not exist{looked}; give --storage, or create the study first.")
 
 
+def _check_writable(path: Path, create: bool) -> bool:
+    """Tell whether a file can be written; it is made where it is missing.
+
+    Raises OSError where it cannot be, unless that is a matter of permission and nothing is to be created: a copy on a
+    medium that cannot be written can still be read.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "ab"):
+            return True
+    except OSError as error:
+        if create or error.errno not in _READ_ONLY:
+            raise
+        return False
+
+
 def _journal(path: Path, name: str, create: bool) -> Storage:
     if path.is_dir():
         path = path / JOURNAL
     if not path.exists() and not create:
         raise _missing(str(path), path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(path, "ab+") as journal:
-            journal.seek(0)
+        _check_writable(path, create)
+        with open(path, "rb") as journal:
             start = journal.read(2)
         if not b'{"'.startswith(start):  # before anything is mended in a file that is somebody else's
             raise InputError(f"storage {str(path)!r} cannot be read: it is no journal, but some other file.")
@@ -171,32 +190,39 @@ def _sqlite(url: str, name: str, create: bool) -> Storage:
     path = Path(file)
     if not path.exists() and not create:
         raise _missing(url, path)
+    lock = path.with_name(path.name + _TELLING)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(path, "ab"):
-            pass
+        writable = _check_writable(path, create) and _check_writable(lock, create)
     except OSError as error:
         raise InputError(f"storage {url!r} cannot be written: {error.strerror or error}.") from None
     arguments: dict[str, Any] = {} if "timeout" in make_url(url).query else {"timeout": _SQLITE_PATIENCE}
-    storage, engine = _database(url, url, {"connect_args": arguments}, path.with_name(path.name + _TELLING))
+    alone = StudyLock("", lock).held() if writable else nullcontext()
+    storage, engine = _database(url if writable else _read_only(path), url, {"connect_args": arguments}, alone)
     return Storage(storage, url, name, path, engine)
+
+
+def _read_only(path: Path) -> str:
+    """Return the URL under which SQLite opens a file for reading."""
+    return f"sqlite:///file:{quote(str(path.absolute()))}?mode=ro&uri=true"
 
 
 def _postgresql(driver_url: str, url: str, name: str) -> Storage:
     arguments = {"pool_pre_ping": True, "connect_args": {"connect_timeout": 10}}
-    storage, engine = _database(driver_url, url, arguments, None)
+    storage, engine = _database(driver_url, url, arguments, _alone_on_server(driver_url, arguments))
     return Storage(storage, url, name, None, engine)
 
 
-def _database(driver_url: str, url: str, engine_kwargs: dict[str, Any], lock: Path | None) -> tuple[BaseStorage, Any]:
-    """Return an opened database and its engine; its tables are made where they are missing."""
+def _database(
+    driver_url: str, url: str, engine_kwargs: dict[str, Any], alone: AbstractContextManager[None]
+) -> tuple[BaseStorage, Any]:
+    """Return an opened database and its engine; its tables are made where they are missing, while `alone` is held."""
     from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
     from surehold.studies.columns import ColumnStorage
 
     shown = _without_password(url)
     try:
-        with _alone(driver_url, engine_kwargs, lock), warnings.catch_warnings():
+        with alone, warnings.catch_warnings():
             warnings.simplefilter("ignore")
             storage = ColumnStorage(driver_url, engine_kwargs=engine_kwargs)
     except ArgumentError as error:
@@ -210,12 +236,8 @@ def _database(driver_url: str, url: str, engine_kwargs: dict[str, Any], lock: Pa
 
 
 @contextmanager
-def _alone(driver_url: str, engine_kwargs: dict[str, Any], lock: Path | None) -> Iterator[None]:
-    """Let nobody else make the tables of a new database meanwhile: by the file `lock`, or by the server."""
-    if lock is not None:
-        with StudyLock("", lock).held():
-            yield
-        return
+def _alone_on_server(driver_url: str, engine_kwargs: dict[str, Any]) -> Iterator[None]:
+    """Let nobody else make the tables of a new database in the block."""
     from sqlalchemy import create_engine
 
     engine = create_engine(driver_url, **engine_kwargs)
