@@ -42,8 +42,10 @@ DOORS = {
 }
 
 
-def python(code):
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=600)
+def python(code, folder=None):
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=600, cwd=folder
+    )
 
 
 def test_the_core_works_alone():
@@ -93,6 +95,23 @@ def test_the_command_line_says_it_in_one_line(arguments, blocked, extra):
     assert done.stderr.startswith("error: ")
     assert done.stderr.endswith(f"pip install 'surehold[{extra}]'.\n")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ("--help", "grasp"),
+        ("--version", "surehold"),
+        ("grasp --help", "--preshape"),
+        ("campaign list", "robust"),
+        ("study create rig --parameters x=0:1", "Created study rig"),
+    ],
+)
+def test_commands_that_grasp_nothing_do_without_what_grasps_need(arguments, said, tmp_path):
+    code = "import sys\nfor name in ('trimesh', 'manifold3d'): sys.modules[name] = None\n"
+    done = python(f"{code}from surehold.cli import main\nmain({arguments.split()})", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert said in done.stdout
 
 
 def test_the_packages_of_an_extra_are_those_of_the_project_file():

@@ -1,20 +1,5 @@
-"""Names among which a user chooses, in the order of messages; light, so that a command starts quickly."""
+"""Names among which a user chooses, public here; they are listed where the command line can read them without us."""
 
-from typing import Final
+from surehold.choices import CLOSING_MODES, COLLISIONS, CONTACT_MODELS, QUALITIES
 
-__all__ = ["CLOSING_MODES", "COLLISIONS", "CONES", "CONTACT_MODELS", "QUALITIES"]
-
-CONTACT_MODELS: Final = ("graded", "patch", "single")  #: see closing/contacts.py
-CLOSING_MODES: Final = ("adaptive", "synergy")  #: whether links beyond a touching one go on
-QUALITIES: Final = (
-    "epsilon",
-    "signed_epsilon",
-    "volume",
-    "simox",
-    "task",
-    "closure",
-    "min_weight",
-    "balance",
-)  #: see wrench/quality.py
-CONES: Final = ("polyhedral", "round")  #: of friction
-COLLISIONS: Final = ("penalty", "zero")  #: worth of a hand that collides while open: a penalty growing with depth, or 0
+__all__ = ["CLOSING_MODES", "COLLISIONS", "CONTACT_MODELS", "QUALITIES"]

@@ -5,8 +5,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.choices import CLOSING_MODES, COLLISIONS, CONTACT_MODELS
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.choices import CLOSING_MODES, COLLISIONS, CONTACT_MODELS
 from surehold.grasping.closing.attempt import Attempt, HandArrays, attempt, felt, hand_arrays, open_gaps, times
 from surehold.grasping.closing.contacts import DEPTH, GRADED, Contacts, as_contacts
 from surehold.grasping.grasp import Grasp, Status

@@ -35,8 +35,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.choices import CONES, QUALITIES
 from surehold.errors import InputError, unknown_name
-from surehold.grasping.choices import CONES, QUALITIES
 from surehold.grasping.object.model import GraspObject
 from surehold.grasping.wrench.ellipsoids import RoundCones
 from surehold.grasping.wrench.equilibrium import balance_quality, min_weight

@@ -22,8 +22,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.choices import CONES
 from surehold.errors import unknown_name
-from surehold.grasping.choices import CONES
 from surehold.grasping.wrench.friction_cones import (
     CheckedContacts,
     Convention,

@@ -7,13 +7,15 @@ does.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Final, Literal, NamedTuple, TypedDict, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, TypedDict
 
 from numpy.typing import ArrayLike
 
+from surehold.choices import CLOSING_MODES, COLLISIONS, CONES, CONTACT_MODELS, QUALITIES
 from surehold.errors import unknown_name
-from surehold.grasping.choices import CLOSING_MODES, COLLISIONS, CONES, CONTACT_MODELS, QUALITIES
-from surehold.grasping.hand.model import Hand
+
+if TYPE_CHECKING:  # the command line reads this table where grasping, an extra, is not installed
+    from surehold.grasping.hand.model import Hand
 
 __all__ = [
     "AMPLITUDES",
@@ -94,7 +96,7 @@ class GraspOptions(TypedDict, total=False):
     ]
     task: Annotated[ArrayLike | None, GraspOption(None, "Wrenches (k, 6) of the quality task.", text=None)]
     hand: Annotated[
-        str | Hand,
+        "str | Hand",
         GraspOption(
             "icub-left", "icub-left, icub-right, shadow, panda, a description (.yaml) or a model (.xml, .urdf)."
         ),
@@ -162,7 +164,7 @@ class DescribedGrasp(GraspOptions, total=False):
     ]
 
 
-_HINTS = get_type_hints(DescribedGrasp, include_extras=True)
+_HINTS: Final[dict[str, Any]] = DescribedGrasp.__annotations__
 #: Name -> option, of `DescribedGrasp`: what is grasped comes first.
 OPTIONS: Final[Mapping[str, GraspOption]] = {
     name: _HINTS[name].__metadata__[0] for name in sorted(_HINTS, key=lambda name: name in GraspOptions.__annotations__)
