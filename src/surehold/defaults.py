@@ -253,6 +253,12 @@ MANY_LEARNT: Final = 200
 #: Trials that a query is then answered from: the nearest of all, of every eighth, of every 64th.
 #: python -m benchmarks.growth
 NEIGHBORS: Final = (36, 12, 8)
+#: Of an average, a point is answered from the trials near the query where it lies within this fraction of the distance
+#: of the farthest one of the nearest; the others share neighborhoods of their own, a quarter as many as there are
+#: points, from the fewest to the most. Time: python -m benchmarks.growth.
+WITHIN_REACH: Final = 0.5
+FEWEST_NEIGHBORHOODS: Final = 4
+MOST_NEIGHBORHOODS: Final = 15
 #: Observation noise that varies: median length-scale of its logarithm over sqrt(d) box widths, standard deviation of
 #: that in logarithms, prior of its variance; rounds, the change of the logarithm that ends them, and the largest step
 #: at one observation. Never measured.

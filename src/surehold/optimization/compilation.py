@@ -12,6 +12,8 @@ from hashlib import sha256
 from inspect import signature
 from typing import Any, Final
 
+import numpy as np
+
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.surrogates.gaussian_process.likelihood import log_posterior
 from surehold.optimization.surrogates.gaussian_process.neighbors import NeighborPosterior
@@ -113,3 +115,5 @@ def _short_run(told: Mapping[str, Any]) -> None:
     if isinstance(few, GaussianProcessPosterior):  # what becomes of it when there are many trials
         many = NeighborPosterior(few.evidence, few.hyperparameters.theta, few.outputs, 0)
         many.moments(optimizer.X, gradient=True)
+        if told["input_noise"]:  # points farther away than any trial
+            many.average(optimizer.X, 2.0 * np.eye(2), np.full(2, 0.5), gradient=True)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
+from scipy.special import ndtri
 from scipy.stats import qmc
 
 import surehold as sh
@@ -76,7 +77,7 @@ def test_the_nearest_trials_tell_nearly_what_all_do(noise):
 def test_the_nearest_of_every_set_are_found():
     _, near = _both(300)
     queries = np.random.default_rng(5).random((9, 2))
-    rows, counts = near.nearest(queries)
+    rows, counts, reach = near.nearest(queries)
     scale = np.exp(-near.hyperparameters.theta[:, :2].mean(axis=0))
     distances = cdist(queries * scale, near.evidence.X * scale)
     for i in range(9):
@@ -85,6 +86,7 @@ def test_the_nearest_of_every_set_are_found():
             part = np.arange(300)[:: 8**level]
             wanted |= set(part[np.argsort(distances[i, part])[:count]].tolist())
         assert set(rows[i, : counts[i]].tolist()) == wanted
+        np.testing.assert_allclose(reach[i], np.sort(distances[i])[NEIGHBORS[0] - 1])
 
 
 def test_gradients_are_those_of_the_values_where_the_neighbors_stay():
@@ -95,6 +97,68 @@ def test_gradients_are_those_of_the_values_where_the_neighbors_stay():
         shift = step * np.eye(2)[k]
         up, down = (near.average(query + sign * shift, OFFSETS, WEIGHTS) for sign in (1.0, -1.0))
         np.testing.assert_allclose(found.mean_gradient[:, 0, k], (up.mean - down.mean)[:, 0] / (2 * step), rtol=1e-3)
+
+
+WIDE = 0.15 * ndtri(qmc.Halton(2, seed=0).random(64))  # beyond what one neighborhood reaches of 300 trials
+EQUAL = np.full(64, 1.0 / 64.0)
+INSIDE = 0.3 + 0.4 * np.random.default_rng(2).random((12, 2))
+
+
+def test_averages_over_more_than_a_neighborhood_are_those_of_their_points():
+    exact, near = _both(300)
+    theirs, ours = exact.average(INSIDE, WIDE, EQUAL), near.average(INSIDE, WIDE, EQUAL)
+    truth = _response((INSIDE[:, None] + WIDE).reshape(-1, 2)).reshape(12, 64) @ EQUAL
+    points = (INSIDE[:, None] + WIDE).reshape(-1, 2)
+    singly = near.moments(points).mean.mean(axis=0).reshape(12, 64) @ EQUAL
+    miss = np.sqrt(np.mean((ours.mean.mean(axis=0) - truth) ** 2))
+    assert miss < 3.0 * np.sqrt(np.mean((singly - truth) ** 2)) + 1e-4, "near as good as each point by itself"
+    assert np.all(ours.variance >= theirs.variance * (1.0 - 1e-3)), "fewer trials never tell more"
+    assert np.all(np.sqrt(np.mean((ours.mean - theirs.mean) ** 2 / ours.variance)) < 1.0), "as unsure as it is wrong"
+
+
+def test_the_average_of_noisy_trials_is_nearly_as_sure_as_from_all():
+    exact, near = _both(300, noise=0.1)
+    theirs, ours = exact.average(INSIDE, WIDE, EQUAL), near.average(INSIDE, WIDE, EQUAL)
+    assert np.all(ours.variance >= theirs.variance * (1.0 - 1e-6))
+    assert np.all(ours.variance < 1.5 * theirs.variance), "errors of the points are not all the same error"
+
+
+@pytest.mark.parametrize("kernel", ["matern52", "matern52_product"])
+def test_gradients_are_those_of_the_values_with_several_neighborhoods(kernel):
+    _, near = _both(300, noise=0.1, kernel=kernel)
+    query, step = np.array([[0.31, 0.62]]), 1e-5
+    slopes = np.where(WIDE > 0.2, 0.0, 1.0)  # as of points at the border
+    found = near.average(query, WIDE, EQUAL, gradient=True, slopes=slopes)
+    for k in range(2):
+        change = step * np.eye(2)[k]
+        values = [near.average(query, WIDE + sign * slopes * change, EQUAL) for sign in (1.0, -1.0)]
+        for ours, up, down in zip(found[2:], *(moments[:2] for moments in values), strict=True):
+            np.testing.assert_allclose(ours[:, 0, k], (up - down)[:, 0] / (2 * step), rtol=1e-3, atol=1e-7)
+
+
+def test_what_was_averaged_before_changes_nothing(monkeypatch):
+    wanted = _both(300)[1].average(INSIDE, WIDE, EQUAL)
+    near = _both(300)[1]
+    near.average(INSIDE[6:], WIDE, EQUAL)
+    np.testing.assert_array_equal(near.average(INSIDE, WIDE, EQUAL).variance, wanted.variance)
+    monkeypatch.setattr("surehold.optimization.surrogates.gaussian_process.neighborhoods._MOST", 0)  # nothing is kept
+    offsets = np.tile(WIDE, (12, 1, 1))
+    np.testing.assert_allclose(near.average(INSIDE, offsets, EQUAL).mean, wanted.mean, rtol=1e-12)
+    one = near.average(INSIDE[3:4], WIDE, EQUAL, gradient=True)
+    np.testing.assert_allclose(one.variance[:, 0], wanted.variance[:, 3], rtol=1e-6)
+
+
+def test_one_trial_more_keeps_averages_under_input_noise():
+    def f(X):
+        return np.sin(7.0 * X[:, 0]) * np.cos(5.0 * X[:, 1])
+
+    X = np.random.default_rng(0).random((MANY + 1, 2))
+    means = []
+    for n in (MANY, MANY + 1):
+        optimizer = sh.Optimizer(sh.Box.unit(2), input_noise=sh.InputNoise.unit(0.1), surrogate="gp", n_initial=1)
+        optimizer.restore(X[:n], f(X[:n]))
+        means.append(optimizer.predict(INSIDE, under_noise=True)[0])
+    np.testing.assert_allclose(means[1], means[0], atol=3e-4)
 
 
 def test_many_trials_are_answered_from_their_neighbors_and_few_are_not():

@@ -1,4 +1,4 @@
-"""A Gaussian process on many trials: every query is answered from the trials that say most about it (compiled in part).
+"""A Gaussian process on many trials: every query is answered from the trials that say most about it.
 
 Legend
     n    trials, k << n those that one query is answered from
@@ -7,31 +7,35 @@ Legend
 Conditioning on the nearest trials alone leaves out little, for these screen the others (Vecchia 1988; Stein 2002). A
 few farther ones belong to them, or the prediction would depend on a small place only (Stein, Chi and Welty 2004): the
 nearest of all trials, of every eighth, and of every 64th. Time and memory of a query do not grow with n.
+
+Points of an average that lie beyond the trials near its query are answered from others, near them (`neighborhoods`).
 """
 
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import NEIGHBORS
+from surehold.defaults import NEIGHBORS, WITHIN_REACH
 from surehold.errors import SureholdError
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
+from surehold.optimization.surrogates.gaussian_process.neighbor_averages import (
+    average_by_groups,
+    average_by_neighbors,
+)
+from surehold.optimization.surrogates.gaussian_process.neighborhoods import Neighborhoods, unfactorized
 from surehold.optimization.surrogates.gaussian_process.outputs import Standardization
 from surehold.optimization.surrogates.gaussian_process.posterior import Hyperparameters
-from surehold.optimization.surrogates.gaussian_process.prediction import (
-    average,
-    factorize,
-    prior_variance,
-    sample,
-)
+from surehold.optimization.surrogates.gaussian_process.prediction import factorize, prior_variance, sample
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Regions
-from surehold.store.kernels import njit
 
 __all__ = ["NeighborPosterior"]
 
 _COARSER: Final = 8  # every so manieth trial is in the next coarser set
 _SAMPLED: Final = 384  # trials, about, that joint draws are conditioned on
+_BLOCK: Final = 32  # queries whose neighborhoods are kept all together
+_SMALLEST: Final = 1e-150  # reach of trials that all lie at one place
 
 
 class NeighborPosterior:
@@ -58,20 +62,28 @@ class NeighborPosterior:
         self.diagnostics: Final = FitDiagnostics(n, cost, 0, outputs.flat)
         self.regions: Final = Regions.whole(d, self.hyperparameters.separable)
 
-    def nearest(self, queries: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def nearest(self, queries: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Return the trials (q, k) that queries (q, d) are answered from, in rising order, and how many each has (q,).
 
-        A row with fewer is filled up with its last one.
+        A row with fewer is filled up with its last one. Third is the scaled distance (q,) of the farthest one of those
+        that are the nearest of all trials.
         """
-        found = []
+        found, reach = [], np.empty(0)
         for (part, tree), count in zip(self._trees, NEIGHBORS, strict=True):
-            rows = tree.query(queries * self._scale, k=np.arange(1, min(count, len(part)) + 1))[1]  # pyright: ignore[reportArgumentType]
+            distances, rows = tree.query(queries * self._scale, k=np.arange(1, min(count, len(part)) + 1))  # pyright: ignore[reportArgumentType]
+            reach = reach if found else distances[:, -1]
             found.append(part[rows])
         rows = np.sort(np.concatenate(found, axis=1), axis=1)
         first = np.concatenate([np.ones((len(rows), 1), dtype=bool), rows[:, 1:] != rows[:, :-1]], axis=1)
         counts = first.sum(axis=1)
         order = np.argsort(~first, axis=1, kind="stable")
-        return np.ascontiguousarray(np.take_along_axis(rows, order, axis=1), dtype=np.int64), counts.astype(np.int64)
+        rows = np.ascontiguousarray(np.take_along_axis(rows, order, axis=1), dtype=np.int64)
+        return rows, counts.astype(np.int64), np.maximum(reach, _SMALLEST)
+
+    @cached_property
+    def _neighborhoods(self) -> Neighborhoods:
+        anchors = np.asarray(self._trees[1][0], dtype=np.int64)
+        return Neighborhoods(self.evidence, self._Y, self.hyperparameters, anchors, self._scale, self.nearest)
 
     def average(
         self,
@@ -81,29 +93,60 @@ class NeighborPosterior:
         gradient: bool = False,
         slopes: NDArray[np.float64] | None = None,
     ) -> Moments:
-        """Return the moments of sum_i weights[i] f(query + offsets[i]); see `GaussianProcessPosterior.average`."""
+        """Return the moments of sum_i weights[i] f(query + offsets[i]); see `GaussianProcessPosterior.average`.
+
+        The mean is a weighted sum of the trials near its points; the variance is that of its error, which is never
+        below the one given all trials.
+        """
+        queries, (q, d) = np.ascontiguousarray(queries), queries.shape
         shape = (-1, *offsets.shape[-2:])
-        rows, counts = self.nearest(queries)
-        mean, variance, mean_gradient, variance_gradient = average_by_neighbors(
-            np.ascontiguousarray(queries),
+        steps = (
             np.ascontiguousarray(offsets).reshape(shape),
             np.ascontiguousarray(np.ones_like(offsets) if slopes is None else slopes).reshape(shape),
-            np.ascontiguousarray(weights),
-            self.evidence.X,
-            self._Y,
-            self.evidence.noise,
-            self.hyperparameters.inverse_l,
-            self.hyperparameters.s2,
-            self.hyperparameters.v,
-            self.evidence.ratio,
-            self.evidence.mean_variance,
-            self.evidence.kernel,
-            rows,
-            counts,
-            gradient,
         )
-        if np.isnan(mean).any():
-            raise SureholdError("the covariance of the trials could not be factorized; are outputs of sane size?")
+        weights = np.ascontiguousarray(weights)
+        own, evidence = self.hyperparameters, self.evidence
+        prior = prior_variance(
+            *steps, weights, own.inverse_l, own.s2, evidence.mean_variance, evidence.kernel, gradient
+        )
+        m, derivatives = len(self._Y), q if gradient else 0
+        moments = np.empty((m, q)), np.empty((m, q)), np.empty((m, derivatives, d)), np.empty((m, derivatives, d))
+        rows, counts, reach = self.nearest(queries)
+        distances = np.sqrt(np.square(steps[0] * self._scale).sum(axis=2))  # (1 or q, s)
+        wide = (distances > WITHIN_REACH * reach[:, None]).any(axis=1)
+        for part in (np.flatnonzero(~wide), *_blocks(np.flatnonzero(wide))):
+            if not len(part):
+                continue
+            each = part if len(steps[0]) == q else np.array([0])
+            some = steps[0][each], steps[1][each]
+            arguments = (
+                queries[part],
+                *some,
+                weights,
+                (prior[0][:, each].copy(), prior[1][:, each if gradient else slice(0)].copy()),
+                evidence.X,
+                self._Y,
+                evidence.noise,
+                own.inverse_l,
+                own.s2,
+                own.v,
+                evidence.ratio,
+                evidence.mean_variance,
+                evidence.kernel,
+                rows[part],
+                counts[part],
+            )
+            if wide[part[0]]:
+                around = self._neighborhoods
+                shares = around.shares(queries[part], queries[part][:, None, :] + some[0], reach[part])
+                found = average_by_groups(*arguments, *shares, around.prepared(shares.anchors), gradient)
+            else:
+                found = average_by_neighbors(*arguments, gradient)
+            if np.isnan(found[0]).any():
+                raise unfactorized()
+            for whole, one in zip(moments[: 4 if gradient else 2], found, strict=False):
+                whole[:, part] = one
+        mean, variance, mean_gradient, variance_gradient = moments
         scale = self.outputs.scale
         return Moments(
             self.outputs.shift * weights.sum() + scale * mean,
@@ -171,72 +214,6 @@ class NeighborPosterior:
         return 1.0 / self.hyperparameters.inverse_l[:, : self.evidence.X.shape[1]]
 
 
-@njit(cache=True)
-def average_by_neighbors(
-    Q,
-    offsets,
-    slopes,
-    weights,
-    X,
-    Y,
-    noise,
-    inverse_l,
-    s2,
-    v,
-    ratio,
-    mean_variance,
-    kernel,
-    rows,
-    counts,
-    gradient,
-):
-    """Return what `prediction.average` does, each query given the trials of its row alone; NaN on failure."""
-    m = Y.shape[0]
-    q, d = Q.shape
-    mean = np.empty((m, q))
-    variance = np.empty((m, q))
-    mean_gradient = np.empty((m, q if gradient else 0, d))
-    variance_gradient = np.empty((m, q if gradient else 0, d))
-    last = offsets.shape[0] - 1
-    prior, prior_gradient = prior_variance(offsets, slopes, weights, inverse_l, s2, mean_variance, kernel, gradient)
-    for i in range(q):
-        k = counts[i]
-        near = np.empty((k, d))
-        values = np.empty((m, k))
-        loud = np.empty(k)
-        for a in range(k):
-            row = rows[i, a]
-            loud[a] = noise[row]
-            for c in range(d):
-                near[a, c] = X[row, c]
-            for j in range(m):
-                values[j, a] = Y[j, row]
-        inverse_L = np.empty((m, k, k))
-        alpha = np.empty((m, k))
-        if factorize(near, values, loud, inverse_l, s2, v, ratio, mean_variance, kernel, inverse_L, alpha) < 0:
-            mean[:] = np.nan
-            return mean, variance, mean_gradient, variance_gradient
-        b = min(i, last)
-        one_mean, one_variance, by_mean, by_variance = average(
-            Q[i : i + 1],
-            offsets[b : b + 1],
-            slopes[b : b + 1],
-            weights,
-            (prior[:, b : b + 1], prior_gradient[:, b : b + 1]),
-            near,
-            inverse_l,
-            s2,
-            mean_variance,
-            kernel,
-            inverse_L,
-            alpha,
-            gradient,
-        )
-        for j in range(m):
-            mean[j, i] = one_mean[j, 0]
-            variance[j, i] = one_variance[j, 0]
-            if gradient:
-                for c in range(d):
-                    mean_gradient[j, i, c] = by_mean[j, 0, c]
-                    variance_gradient[j, i, c] = by_variance[j, 0, c]
-    return mean, variance, mean_gradient, variance_gradient
+def _blocks(numbers: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Return numbers (q,) in blocks whose neighborhoods are few enough to be kept all together."""
+    return [numbers[start : start + _BLOCK] for start in range(0, len(numbers), _BLOCK)]

@@ -35,7 +35,7 @@ from surehold.optimization.surrogates.gaussian_process.kernels import (
 from surehold.optimization.surrogates.gaussian_process.likelihood import data_covariance
 from surehold.store.kernels import njit
 
-__all__ = ["average", "factorize", "means", "prior_variance", "sample"]
+__all__ = ["add", "average", "factorize", "means", "prior_variance", "sample", "slopes_along"]
 
 _LARGEST_REPAIR = 1e-2  # nugget ratio beyond which a factorization is given up
 _ALIKE = 1e-12  # box widths between perturbations that differ by rounding only
@@ -68,14 +68,14 @@ def factorize(X, Y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, inver
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _add(row, factor, sums):
+def add(row, factor, sums):
     """Add factor times row (n,) to sums (n,)."""
     for a in range(row.size):
         sums[a] += factor * row[a]
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _slopes(factor, z, row, first, second):
+def slopes_along(factor, z, row, first, second):
     """Return the sums over trials a of -g_a (z - row_a) times first (n,), and times second (n,).
 
     factor (n,) are the factors g of a dimension, z is that coordinate of the point, row (n,) that of the trials.
@@ -169,7 +169,7 @@ def average(Q, offsets, slopes, weights, prior, X, inverse_l, s2, mean_variance,
                     correlations_and_factors(kernel, points[i, w], Z, inverse_l[j], C, F[i, w])
                 else:
                     correlations(kernel, points[i, w], Z, inverse_l[j], C)
-                _add(C, s2[j] * weights[w], K[i])
+                add(C, s2[j] * weights[w], K[i])
         times_lower(inverse_L[j], K, V)
         for i in range(q):
             mean[j, i] = product(alpha[j], K[i], n)
@@ -181,7 +181,7 @@ def average(Q, offsets, slopes, weights, prior, X, inverse_l, s2, mean_variance,
                     for k in range(d):
                         scale = inverse_l[j, k]
                         g = along(kernel, points[i, w, k], Z[k], inverse_l[j], k, F[i, w], C)
-                        t, u = _slopes(g, points[i, w, k], Z[k], alpha[j], W[i])
+                        t, u = slopes_along(g, points[i, w, k], Z[k], alpha[j], W[i])
                         rate = s2[j] * scale**2 * weights[w] * slopes[min(i, last), w, k]
                         mean_gradient[j, i, k] += rate * t
                         variance_gradient[j, i, k] -= 2.0 * rate * u
