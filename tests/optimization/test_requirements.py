@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
@@ -290,3 +291,15 @@ def test_under_input_noise_trials_are_sought_where_they_may_be_the_answer(seed):
     assert 0.543 < best.x[0] < 0.5507
     assert best.feasible >= 0.95
     assert "too few to be sure of the 95% asked for" in best.refused or "expected to keep" not in best.refused
+
+
+def test_of_noisy_outputs_feasible_leaves_the_noise_out_that_a_measured_value_has():
+    rng = np.random.default_rng(1)
+    X = rng.random((60, 1))
+    optimizer = Optimizer(Box({"x": (0.0, 1.0)}), noise="inferred", constraints={"force": (None, 1.2)}, seed=0)
+    forces = 2.0 * X + 0.2 * rng.standard_normal((60, 1))
+    optimizer.restore(X, X[:, 0] + 0.05 * rng.standard_normal(60), outputs=forces)
+    best = optimizer.recommend()
+    measured = ndtr((1.2 - 2.0 * best.x[0]) / 0.2)
+    assert best.outputs["force"].probability_below(1.2) == pytest.approx(measured, abs=0.15)
+    assert best.feasible > best.outputs["force"].probability_below(1.2) + 0.1

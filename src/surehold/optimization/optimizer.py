@@ -131,7 +131,7 @@ class Optimizer(Record):
         their own units; None where there is no limit. With (None, None) an output is recorded and modelled only.
     feasible
         Probability with which the answer has to keep all limits of `constraints`: over the input noise (the share of
-        executions) and what the models do not know.
+        executions) and what the models do not know, without the noise of observations.
     safety
         Probability with which every trial after the `initial_points`, which must be given and are trusted, has to keep
         all limits. By default None: trials may break them. It holds as far as the models do, without a proof, and what

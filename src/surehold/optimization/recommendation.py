@@ -125,12 +125,14 @@ class Recommendation:
     parameters
         x as {name: value}.
     feasible
-        Probability that one execution keeps all limits of `constraints`, over the input noise and what the models do
-        not know; 1 where there are none.
+        Probability that the further outputs keep all limits of `constraints` in one execution, over the input noise and
+        what the models do not know; 1 where there are none. Unlike `outputs` it is of the outputs themselves, without
+        the noise of their observations: measured values may break a limit more often.
     infeasible
         Why no feasible input is known and what came nearest; empty where one is. `x` is the nearest then.
     outputs : dict
-        {name: Outcome} of the further outputs of one execution.
+        {name: Outcome} of the further outputs of one execution, as they would be measured: input noise, observation
+        noise and what the models do not know.
     by_risk
         What x is expected to be worth by the risk measure that was asked for; None where that is the mean. Unlike
         `quantile` and `execution` it is of the response, without the noise of observations.

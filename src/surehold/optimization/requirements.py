@@ -5,7 +5,8 @@
     safe               in safe mode, see `Requirements.admission`
 
 A trial is feasible, and may become the answer, where an execution there keeps all outputs within their limits with the
-probability `level`: over the input noise and what the models do not know. Without either, what was told decides.
+probability `level`: over the input noise and what the models do not know. Without either, what was told decides. Noise
+of observations does not count: no input can lessen it by where it is.
 """
 
 from dataclasses import replace

@@ -52,7 +52,7 @@ class StudyRecommendation:
     warning: str = ""
     """what is wrong with the model that all this rests on; empty where nothing is"""
     feasible: float = 1.0
-    """probability that one execution keeps all limits of the further outputs"""
+    """probability that one execution keeps all limits of the further outputs, without the noise of observations"""
     infeasible: str = ""
     """why nothing feasible is known; empty where something is"""
     outputs: dict[str, float] = field(default_factory=dict)

@@ -95,7 +95,8 @@ def execution_probability(
 ) -> NDArray[np.float64]:
     """Return the probability (q,) that one execution at U (q, d) keeps every output within its limits.
 
-    Over the input noise and what the models do not know; given where the execution is, outputs count as independent.
+    Over the input noise and what the models do not know, without the noise of observations; given where the execution
+    is, outputs count as independent.
     `cautious`: by the particle of each model that sees least chance, in place of their mean.
     """
     together = np.ones((len(U), len(perturbations.quadrature.weights)))
