@@ -10,7 +10,7 @@ from surehold.errors import InputError
 
 __all__ = ["Standardization"]
 
-_FLAT: Final = 1e-12  # a spread below this fraction of the largest |y| is rounding, not information
+_FLAT: Final = 64.0  # units in the last place of the largest |y|: a smaller range is rounding, not information
 _SMALLEST: Final = 1e-150  # a spread below this, squared, is 0 in double precision
 _LARGEST: Final = 1e150  # and the square of one above this is infinite
 
@@ -34,10 +34,11 @@ class Standardization(NamedTuple):
     def of(cls, y: NDArray[np.float64], output_range: tuple[float, float] | None = None) -> "Standardization":
         """Return the map to zero mean and unit standard deviation of y (n,).
 
-        Outputs that do not differ, or by less than 1e-150, say nothing about the scale: it is their size, 1 where they
-        are 0 or only one is there, and `flat` says so. A stated `output_range` (lowest and highest value to expect)
-        sets the scale instead: the range counts as four standard deviations, or the data's own spread where that is
-        larger.
+        Outputs that do not differ, or by less than 1e-150 or than 64 units in the last place of the largest, which is
+        rounding, say nothing about the scale, and `flat` says so. It is their size then, in whatever unit they are:
+        values that are all 0.3 may be 0.1 or 0.5 elsewhere. Where they are 0, or only one is there, it is 1. A stated
+        `output_range` (lowest and highest value to expect) sets the scale instead: the range counts as four standard
+        deviations, or the data's own spread where that is larger.
         """
         flat = _is_flat(y)
         top = float(np.abs(y).max()) if len(y) else 0.0
@@ -81,4 +82,4 @@ def _is_flat(y: NDArray[np.float64]) -> bool:
         return True
     top = float(np.abs(y).max())
     half = 0.5 * float(y.max()) - 0.5 * float(y.min())  # the whole range of the largest floats overflows
-    return half <= 0.5 * max(_FLAT * top, _SMALLEST)
+    return half <= 0.5 * max(_FLAT * float(np.spacing(top)), _SMALLEST)
