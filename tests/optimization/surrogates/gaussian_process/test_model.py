@@ -360,7 +360,7 @@ def test_length_scales_far_beyond_the_box(data):
 
 def test_no_nugget_with_repeated_inputs_is_counted_as_repaired():
     X = np.array([[0.1], [0.1], [0.5]])
-    model = GaussianProcess(ratio=0.0, length_scales=[0.3]).fit(X, [1.0, 1.0, 2.0])
+    model = GaussianProcess(ratio=0.0, length_scales=[0.3], signal_variance=1.0).fit(X, [1.0, 1.0, 2.0])
     assert model.posterior.diagnostics.repaired == 1
     assert model.predict([[0.1], [0.5]]) == pytest.approx([1.0, 2.0], abs=1e-4)
 

@@ -24,15 +24,17 @@ Array = NDArray[np.float64]
 _RESTARTS = 20  # of Lanczos' method, which needs one to three
 
 
-def root_of_covariance(evidence: Evidence, center: Array) -> Array:
-    """Return R (p, p) at the mode `center` (p,) of the log posterior; D where the curvature is not finite."""
-    if center.size > MANY_HYPERPARAMETERS:
+def root_of_covariance(evidence: Evidence, center: Array, held: int = 0) -> Array:
+    """Return R (p, p) at the mode `center` (p,) of the log posterior; D where the curvature is not finite.
+
+    R (p - held, p - held) is of the others where the first hyperparameters are held.
+    """
+    if center.size - held > MANY_HYPERPARAMETERS:
         return _root_along_few_directions(evidence, center)
     level = log_posterior_and_gradient(center, evidence)[1]
-    precision = np.array(
-        [_curvature_along(step, evidence, center, level) for step in CURVATURE_STEP * np.eye(center.size)]
-    )
-    deviation = evidence.prior_deviation
+    steps = CURVATURE_STEP * np.eye(center.size)[held:]
+    precision = np.array([_curvature_along(step, evidence, center, level)[held:] for step in steps])
+    deviation = evidence.prior_deviation[held:]
     scaled = 0.5 * (precision + precision.T) * np.outer(deviation, deviation)
     if not np.all(np.isfinite(scaled)):
         return np.diag(deviation)

@@ -20,6 +20,7 @@ from surehold.defaults import (
 )
 from surehold.errors import InputError
 from surehold.optimization.numerics.threads import computing
+from surehold.optimization.surrogates.gaussian_process.held import HELD, learn_held, mode_held
 from surehold.optimization.surrogates.gaussian_process.heteroscedastic import with_learnt_noise
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
     Learning,
@@ -29,7 +30,7 @@ from surehold.optimization.surrogates.gaussian_process.hyperparameters import (
     learn,
     mode,
 )
-from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, kernel_number
+from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, kernel_number, shape_size
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence, log_posterior
 from surehold.optimization.surrogates.gaussian_process.neighbors import NeighborPosterior
 from surehold.optimization.surrogates.gaussian_process.observations import (
@@ -82,7 +83,8 @@ class GaussianProcess:
     learning
         Slice sampling or maximum a posteriori, particles, sweeps.
     length_scales
-        Fixed length-scales (d,) in box widths; nothing is learnt but what is asked for above.
+        Fixed length-scales (d,) in box widths; of the rest is learnt what is asked for above: the signal variance where
+        it is None, noise that is "inferred" or "heteroscedastic", the share of a second scale.
 
     Raises
     ------
@@ -188,7 +190,13 @@ class GaussianProcess:
     @property
     def _learns_at_once(self) -> bool:
         """Whether hyperparameters are learnt, without a chain that goes on or noise at every single trial."""
-        return self._learning.method != "slice" and self._length_scales is None and self._noise != "heteroscedastic"
+        return self._learning.method != "slice" and not self._all_fixed and self._noise != "heteroscedastic"
+
+    @property
+    def _all_fixed(self) -> bool:
+        """Whether nothing is learnt."""
+        fixed = self._length_scales is not None and self._signal_variance is not None
+        return fixed and self._noise not in ("inferred", "heteroscedastic") and not shape_size(self._kernel)
 
     def _learnt_from(
         self, k: int, X: NDArray[np.float64], y: NDArray[np.float64], noise: NDArray[np.float64] | None, stream: int
@@ -231,9 +239,13 @@ class GaussianProcess:
     def _learn(
         self, evidence: Evidence, outputs: Standardization, rng: np.random.Generator, start: NDArray[np.float64] | None
     ) -> Learnt:
-        if outputs.flat and self._standardize:
-            return from_prior(evidence, self._learning.particles, rng)
-        return learn(evidence, self._learning, rng, start)
+        held = self._length_scales is not None
+        if outputs.flat and self._standardize and not self._all_fixed:
+            learnt = from_prior(evidence, self._learning.particles, rng)
+            if held:
+                learnt.particles[:, : evidence.X.shape[1]] = evidence.prior_mean[: evidence.X.shape[1]]
+            return learnt
+        return (learn_held if held else learn)(evidence, self._learning, rng, start)
 
     def standardization(self, y: NDArray[np.float64]) -> Standardization:
         """Return the map of outputs y (n,) to the scale on which this process learns."""
@@ -272,13 +284,9 @@ class GaussianProcess:
         """
         evidence = self._evidence(X, y, outputs, [len(y)] if sizes is None else sizes, weights, noise)
         log_noise = None
-        cost = 0
-        if self._length_scales is not None:
-            particles = self._fixed(evidence)[None, :]
-        else:
-            if self._noise == "heteroscedastic" and noise is None and not outputs.flat:
-                evidence, log_noise = with_learnt_noise(evidence)
-            particles, cost = self._learn(evidence, outputs, rng, start)
+        if self._noise == "heteroscedastic" and noise is None and not outputs.flat:
+            evidence, log_noise = with_learnt_noise(evidence)
+        particles, cost = self._learn(evidence, outputs, rng, start)
         return GaussianProcessPosterior(evidence.first_block(), particles, outputs, cost, log_noise=log_noise)
 
     def log_evidence(
@@ -293,17 +301,18 @@ class GaussianProcess:
         Arguments as in `condition_on_blocks`.
         """
         evidence = self._evidence(X, y, outputs, [len(y)], (1.0,), noise)
-        if self._length_scales is not None:
-            return float(log_posterior(self._fixed(evidence), evidence))
-        theta, _ = mode(evidence)
-        return float(log_posterior(theta, evidence)) - 0.5 * theta.size * log(len(y))
+        if self._length_scales is None:
+            theta, _ = mode(evidence)
+            return float(log_posterior(theta, evidence)) - 0.5 * theta.size * log(len(y))
+        theta, _ = mode_held(evidence)
+        d = X.shape[1]
+        mean, deviation = self._prior_in(d).log_length_scale
+        away = np.broadcast_to((np.log(self._length_scales) - mean) / deviation, (d,))
+        given = -0.5 * float(away @ away) + d * log(HELD / deviation)  # what the prior says of them, in place of HELD
+        return float(log_posterior(theta, evidence)) + given - 0.5 * (theta.size - d) * log(len(y))
 
-    def _fixed(self, evidence: Evidence) -> NDArray[np.float64]:
-        """Return the hyperparameters (p,) where length-scales are given; the others at their prior's mean."""
-        theta = evidence.prior_mean.copy()
-        d = evidence.X.shape[1]
-        theta[:d] = np.log(np.broadcast_to(np.asarray(self._length_scales), (d,)))
-        return theta
+    def _prior_in(self, d: int) -> Prior:
+        return self._prior or Prior((log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION))
 
     def _evidence(
         self,
@@ -320,8 +329,9 @@ class GaussianProcess:
         known = noise if noise is not None else np.full(len(y), 0.0 if isinstance(self._noise, str) else self._noise)
         learn_signal = self._signal_variance is None
         learn_noise = self._noise in ("inferred", "heteroscedastic") and noise is None
-        prior = self._prior or Prior((log(LENGTH_SCALE_MEDIAN * sqrt(d)), LENGTH_SCALE_DEVIATION))
-        prior_mean, prior_deviation = prior.vectors(d, learn_signal, learn_noise, self._kernel)
+        prior_mean, prior_deviation = self._prior_in(d).vectors(d, learn_signal, learn_noise, self._kernel)
+        if self._length_scales is not None:
+            prior_mean[:d], prior_deviation[:d] = np.log(self._length_scales), HELD
         return Evidence(
             np.ascontiguousarray(X, dtype=np.float64),
             np.ascontiguousarray(outputs.apply(y)),
