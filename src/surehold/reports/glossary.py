@@ -78,7 +78,7 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
         words.append(("over shapes", "Mean over equally likely shapes, all of which agree with what was measured."))
     if contact == "graded":
         words.append(
-            ("graded contacts", "A soft touch: a point counts more the nearer it is to the skin, up to 3 mm away.")
+            ("graded contacts", "A soft touch: a point counts more the nearer it is to the skin, up to 6 mm away.")
         )
     if "s1" in [v.name for v in report.variables] or any("s1" in c.pose for c in report.candidates):
         words.append(("s1", "Posture of the hand along its first synergy, in radians; here it turns the thumb."))

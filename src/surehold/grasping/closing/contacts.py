@@ -49,6 +49,8 @@ Array = NDArray[np.float64]
 
 DEPTH: Final = 0.006  #: depth of the soft touch, delta [m]: what is so near is reached as finger and object give way
 SKIN: Final = 0.002  #: thickness of the skin, rho [m]
+_SUNK: Final = 1e-4  # what is as deep in the object is within it, not at its surface [m]
+_STEPS: Final = 24  # in which the way from a sample back to the axis of its link is looked at
 GRADED, PATCH, SINGLE = range(3)  #: the contact models as the compiled functions take them
 
 
@@ -56,7 +58,8 @@ GRADED, PATCH, SINGLE = range(3)  #: the contact models as the compiled function
 class Contacts:
     """Contacts of a grasp, in the frame of the object."""
 
-    points: NDArray[np.float64] = field(repr=False)  #: (c, 3) on the object's surface [m]
+    #: (c, 3) on the object's surface [m]; "graded", of a link that passed something, the mean of two places of it
+    points: NDArray[np.float64] = field(repr=False)
     normals: NDArray[np.float64] = field(repr=False)  #: (c, 3) unit length, into the object
     weights: NDArray[np.float64] = field(repr=False)  #: (c,) in (0, 1]
     bodies: NDArray[np.int64] = field(repr=False)  #: (c,) number of the touching body of the hand
@@ -78,6 +81,35 @@ def _put(rows, n, nodes, frame, x, y, z, weight, body):
     rows[n, 3], rows[n, 4], rows[n, 5] = -gx, -gy, -gz
     rows[n, 6], rows[n, 7] = weight, body
     return n + 1
+
+
+@njit(cache=True)
+def _through(nodes, frame, pose, row, place, x, y, z):
+    """Tell whether a sample at x, y, z, at `place` (3,) of its link, feels a surface from behind, through the object.
+
+    Flat links stop where the capsules within them touch, and their corners may stand out by more than a wall is thick.
+    `row` is the link's of its chain, `pose` (3, 4) the moved frame.
+    """
+    share, square = 0.0, 0.0
+    for i in range(3):
+        along = row[4 + i] - row[1 + i]
+        share += (place[i] - row[1 + i]) * along
+        square += along * along
+    share = min(max(share / square, 0.0), 1.0) if square > 0.0 else 0.0
+    u, v, w = 0.0, 0.0, 0.0  # from the nearest point of the link's axis
+    for i in range(3):
+        out = place[i] - row[1 + i] - share * (row[4 + i] - row[1 + i])
+        u += pose[0, i] * out
+        v += pose[1, i] * out
+        w += pose[2, i] * out
+    _, gx, gy, gz = field_distance_gradient(nodes, frame, x, y, z)
+    if gx * u + gy * v + gz * w <= 0.0:
+        return False
+    for k in range(_STEPS + 1):
+        t = k / _STEPS
+        if field_distance(nodes, frame, x - t * u, y - t * v, z - t * w) < -_SUNK:
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -140,6 +172,10 @@ def skin_contacts(nodes, frame, frames, chains, radii, palm, samples, depth, gra
             w += pose[body, 2, i] * samples[m, 4 + i]
         d = field_distance(nodes, frame, x, y, z)
         if d < depth:
+            if body < links:
+                row = chains[body // joints, body % joints]
+                if _through(nodes, frame, pose[body], row, samples[m, 1:4], x, y, z):
+                    continue
             weight = min(1.0 - d / depth, 1.0) if graded else 1.0
             _put(rows, m, nodes, frame, x - SKIN * u, y - SKIN * v, z - SKIN * w, weight, body)
     return rows

@@ -268,13 +268,15 @@ class GraspChecker:
     def _beyond(self, grasp: Grasp) -> Array:
         """Return how far the joints' targets go beyond the touch when the squeeze is complete [rad or m], (a,)."""
         drives, hand = self.drives, self.simulator.hand
+        on = np.clip(grasp.joints + drives.beyond * drives.closing, hand.lower, hand.upper) - grasp.joints
         if self.squeeze == "full":
-            on = np.clip(grasp.joints + drives.beyond * drives.closing, hand.lower, hand.upper) - grasp.joints
             return on.ravel()[self._moving]
         moving = np.zeros(drives.limits.size)
         moving[self._moving] = 1.0
         limits = drives.largest * moving.reshape(drives.limits.shape)
-        shares, _ = balanced_torques(self.simulator, grasp, limits)
+        shares, residual = balanced_torques(self.simulator, grasp, limits)
+        if residual < 1.0 and not np.any(shares * np.sign(drives.closing) > 0.0):
+            return on.ravel()[self._moving]  # balance asks for no joint to close: nothing would be squeezed
         return (shares * limits / drives.stiffness).ravel()[self._moving]
 
 

@@ -34,6 +34,7 @@ STEP: Final = 0.002  #: of the simulation [s]
 _BENT, _SHIFT = 0.35, 0.01  # how far targets move on beyond the touch [rad, m]; torque is at its limit from half on
 _SLOW = 0.03  # joints that turn with a smaller rate of closing hold their place [rad per unit of the closing parameter]
 _RESPONSE: Final = 0.01  # time in which a joint under position control follows its target [s]
+_CENTERED: Final = 1e-6  # centers of mass nearer than this are the same [m]
 _STIFF = 40.0  # stiffness of a joint that does not close, relative to its torque limit [1/rad]
 
 
@@ -121,6 +122,8 @@ def dynamics_model(simulator: Simulator, drives: Drives) -> Any:
             type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"piece {k}", contype=2, conaffinity=1, density=0.0, **shared
         )
     center, inertia = _inertia(obj.vertices, obj.faces, drives.mass)
+    if not np.allclose(center, obj.center_of_mass, rtol=0.0, atol=_CENTERED):  # the density is not even
+        center = obj.center_of_mass
     thing.mass, thing.ipos, thing.explicitinertial = drives.mass, center, True
     thing.fullinertia = inertia
     return spec.compile()

@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 
 _BALANCE: Final = 1000.0  # B by the largest strain: rather all of that than a wrench of a thousandth of the squeeze
 _RESERVE: Final = 0.8  # share of the friction that the squeeze relies on: the rest is left for the load
+_ROUNDING: Final = 1e-6  # torques by the largest of any contact below which they are none
 _NEAR: Final = 0.5  # weight of a soft touch from which on the skin is pressed [1 - gap / depth]
 
 
@@ -52,7 +53,8 @@ def balanced_torques(simulator: Simulator, grasp: Grasp, limits: Array) -> tuple
     Returns
     -------
     torques, residual
-        Of a hand with fewer than two contacts all torques are 0 and the residual is 1. The residual is the length of
+        Of a hand with fewer than two contacts all torques are 0 and the residual is 1; all are 0, too, where forces
+        balance that need no torque, such as those of one finger on both sides of an edge. The residual is the length of
         W' x, in units of the sum of the normal forces; torques of length, as everywhere, by half the object's size.
     """
     from scipy.optimize import nnls
@@ -87,7 +89,9 @@ def balanced_torques(simulator: Simulator, grasp: Grasp, limits: Array) -> tuple
         return torques, 1.0
     torques = (strain @ x).reshape(limits.shape)
     largest = np.abs(torques).max()
-    return torques / largest if largest > 0.0 else torques, float(np.linalg.norm(wrenches.T @ x) / x.sum())
+    if largest < _ROUNDING * most:  # scaled up, rounding would be the whole torque, in any direction
+        torques, largest = np.zeros(limits.shape), 1.0
+    return torques / largest, float(np.linalg.norm(wrenches.T @ x) / x.sum())
 
 
 def _strains(
