@@ -183,14 +183,15 @@ class ResponseModel:
         signal variance is what the values need divided by how many there are.
         """
         values = trials.modelled if self._screened else trials.values
-        every = np.ones(len(values), dtype=bool)
         noisy = self._told or self._straying is not None or getattr(self._surrogate, "noisy", False)
         if noisy or self._continues_chains:  # the thesis' models take every trial as it comes
-            return every
+            return np.ones(len(values), dtype=bool)
         unit = _SAME_VALUE * (float(np.ptp(values)) or 1.0)
         rows = np.column_stack([trials.reached / _SAME_PLACE, (values - values.min()) / unit])
         _, first = np.unique(np.round(rows), axis=0, return_index=True)
-        return np.isin(np.arange(len(values)), first)
+        told = np.zeros(len(values), dtype=bool)
+        told[first] = True
+        return told
 
     def diagnosis(self, trials: Trials) -> Diagnosis | None:
         """Return how well the model explains the trials told so far; None where it cannot tell."""

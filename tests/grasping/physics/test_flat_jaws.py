@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from surehold.grasping import Pose, Simulator
 from surehold.grasping.hand.configuration import HandConfig
 from surehold.grasping.hand.files import load_hand
+from surehold.grasping.object.distance_field import distance_field_of
 from surehold.grasping.object.mesh_files import load_mesh
 from surehold.grasping.physics.check import GraspChecker
 
@@ -65,6 +66,19 @@ def test_two_pads_on_both_sides_of_a_plate_are_one(jaws, box):
     assert set(grasp.touching) == {"l", "r"}
     assert grasp.quality > 0.1
     assert {-1.0, 1.0} <= set(np.round(grasp.contacts.normals[:, 0]).tolist())
+
+
+def test_quality_does_not_hang_on_where_the_nodes_of_the_grid_lie(jaws, box):
+    """By default they lie on the faces of this box; with the other cell on none."""
+    cube = box(0.03, 0.03, 0.03)
+    apart = replace(cube, distances=distance_field_of(cube, 0.00097, margin=0.02))
+    qualities = [
+        Simulator(jaws, obj, friction=0.5).grasp(Pose((x, y, -0.05))).quality
+        for obj in (cube, apart)
+        for x, y in ((0.0, 0.0), (0.004, -0.0004), (0.0, 0.0065))
+    ]
+    assert min(qualities) > 0.1
+    np.testing.assert_allclose(qualities[:3], qualities[3:], rtol=0.01)
 
 
 @pytest.mark.parametrize("friction", [0.5, 8.0, 10.0])
