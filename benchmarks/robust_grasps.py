@@ -7,6 +7,9 @@ answer is queried 1,000 times more and rated by epsilon, the same perturbations 
 part of the budget. Every finished run is a line of the rows' file: a benchmark that is stopped goes on where it was
 (give another file for another program).
 
+"guess" and "BO, guess" are told, besides, what is known of good grasps before any trial (`GraspProblem.guess`: the palm
+square to the object at the default standoff and posture), which two of three initial trials keep.
+
 Printed are means over seeds with standard errors: of the re-queries' mean, lowest value, standard deviation and the
 mean of their worst tenth; the difference of the means from "robust", paired on common seeds; and CPU seconds a run.
 
@@ -41,7 +44,9 @@ PROBLEMS = {
 }
 METHODS = {
     "robust": {"input_noise": NOISE},
+    "guess": {"input_noise": NOISE, "guess": True},
     "BO": {},
+    "BO, guess": {"guess": True},
     "UEI, thesis": {"input_noise": NOISE, "criterion": "uei", "preset": "thesis-grasp"},
     "UEI": {"input_noise": NOISE, "criterion": "uei"},
     "cvar": {"input_noise": NOISE, "risk": "cvar"},
@@ -54,6 +59,7 @@ SCORES = ("mean", "worst", "std", "tenth")
 
 def searched(problem, n_trials, n_initial, seed, settings):
     """Return the optimizer after all trials."""
+    settings = settings | ({"guess": problem.guess} if settings.get("guess") else {})
     optimizer = sh.Optimizer(problem.box, n_initial=n_initial, seed=seed, **settings)
     for _ in range(n_trials):
         x = optimizer.ask()
@@ -65,7 +71,7 @@ def run(problem, rated, n_trials, n_initial, seed, settings):
     """Return the row of one run: the answer (d,) and what its re-queries of `rated` gave."""
     started = time.process_time()
     optimizer = searched(problem, n_trials, n_initial, seed, settings)
-    x = optimizer.recommend().x if settings else optimizer.X[int(np.argmax(optimizer.y))]
+    x = optimizer.recommend().x if "input_noise" in settings else optimizer.X[int(np.argmax(optimizer.y))]
     seconds = time.process_time() - started
     score = sh.problems.robust_score(rated, x, NOISE, n=REQUERIES, seed=12345)
     if score.n_failed:

@@ -193,7 +193,7 @@ def _check(box: Box, dimension: int, seed: int, settings: dict[str, Any]) -> Non
     if isinstance(dimension, bool) or not isinstance(dimension, int) or not 1 <= dimension <= box.dimension:
         raise InputError(f"dimension is {dimension!r}; give 1 to {box.dimension}, the number of variables.")
     whole_number("seed", seed, 0)
-    for name in ("input_noise", "fixed", "initial_points", "allowed"):
+    for name in ("input_noise", "fixed", "guess", "initial_points", "allowed"):
         if settings.get(name) is not None:
             raise InputError(f"{name} is about the variables of the box, not of an embedding; leave it out.")
     for name in ("direction", "constraints", "conditions", "outcome"):

@@ -58,3 +58,12 @@ def test_a_run_replaces_what_another_left_in_its_folder(here, capsys):
     names = {p.name for p in (here / "again").iterdir()}
     assert names >= {"notes.txt", "glass.obj", "grasps.yaml", "report.html", "result.json"}
     assert not names & {"graspgen.json", "dexgraspbench", "bottle.obj"}
+
+
+def test_initial_trials_of_many_variables_begin_at_the_default_pose(here):
+    line = "grasp bottle --variables dx,dy,rx,ry,s1 --trials 6 --initial 6 --requeries 0 --out b"
+    assert run(line.split()) == 0
+    found = json.loads((here / "b" / "result.json").read_text())
+    tried = [x[2:] == pytest.approx([0.0, 0.0, -0.7], abs=1e-12) for x in found["trials"]["x"]]
+    assert tried == [True, True, False] * 2
+    assert found["settings"]["guess"] == "rx=0, ry=0, s1=-0.7"

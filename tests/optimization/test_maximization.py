@@ -307,6 +307,26 @@ def test_initial_points_are_tried_first_and_the_design_follows():
     assert Optimizer(box, initial_points=[[0.5, 1.5]]).n_initial == Optimizer(box).n_initial
 
 
+def test_two_of_three_initial_trials_keep_what_is_guessed():
+    box = Box({"a": (0.0, 1.0), "force": (1.0, 100.0, "log"), "grip": ["pinch", "power", "hook"]})
+    optimizer = Optimizer(
+        box, guess={"force": 10.0, "grip": "power"}, initial_points=[{"a": 0.5, "force": 2.0, "grip": "hook"}], seed=1
+    )
+    asked = [trial.parameters for trial in optimizer.ask_trial(optimizer.n_initial)]
+    assert (asked[0]["force"], asked[0]["grip"]) == (pytest.approx(2.0), "hook"), "the initial points come first"
+    kept = [p["grip"] == "power" and p["force"] == pytest.approx(10.0) for p in asked[1:]]
+    assert len(kept) == 14
+    assert kept == [k % 3 != 2 for k in range(14)]
+
+
+def test_what_is_guessed_is_tried_where_it_is_allowed():
+    box = Box({"a": (0.0, 1.0), "b": (0.0, 1.0)})
+    X = Optimizer(box, guess={"b": 0.9}, allowed="a + b <= 1.2", n_initial=30, seed=0).ask(30)
+    assert np.all(X.sum(axis=1) <= 1.2 + 1e-9)
+    kept = np.isclose(X[:, 1], 0.9)
+    assert 3 <= np.sum(kept) <= 20, "of twenty that keep it those with a <= 0.3 are allowed, some seven"
+
+
 def test_fixed_variables_keep_their_value():
     box = Box({"a": (-1.0, 1.0), "b": (0.0, 2.0), "c": (0.0, 1.0)})
 
@@ -330,6 +350,11 @@ def test_fixed_variables_keep_their_value():
         ({"fixed": {"x": 9.0}}, "x = 9 lies outside its range"),
         ({"fixed": {"x": "much"}}, "give a finite number"),
         ({"fixed": {"x": 0.5}}, "every variable is fixed"),
+        ({"guess": {"y": 1.0}}, "guess variable 'y' is unknown"),
+        ({"guess": {"x": 9.0}}, "guess: x = 9 lies outside its range"),
+        ({"guess": 0.5}, "guess is 0.5; give {name: value}"),
+        ({"guess": {"x": 0.5}, "fixed": {"x": 0.5}}, "every variable is fixed"),
+        ({"guess": {"x": 0.5}, "safety": 0.9, "constraints": {"c": (0, 1)}, "initial_points": [[0.5]]}, "leave one"),
         ({"initial_points": [[9.0]]}, "not inside"),
         ({"initial_points": [[0.1, 0.2]]}, "shape"),
         ({"input_noise": 0.03}, r"InputNoise.unit\(0.03\).*InputNoise\(\{'x': 0.03\}\)"),

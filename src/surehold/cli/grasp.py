@@ -145,6 +145,7 @@ def grasp(
         problem = described_grasp(described, body, progress)
     described["facet"] = problem.facet
     checker = checker_for(problem, check, outcome)
+    guess = {} if preset else problem.guess
     simox = problem.simulator.quality == "simox"
     folder = folder_for(f"{problem.object.name} {problem.facet}", method, seed, out, study)
 
@@ -203,6 +204,7 @@ def grasp(
             "closing": problem.simulator.closing,
             "friction": friction_in_words(problem.simulator) if simox else problem.simulator.friction,
             "input noise": noise,
+            "guess": ", ".join(f"{name}={value:.3g}" for name, value in guess.items()) or None,
         },
         describe=describe,
         also_write=also_write,
@@ -215,6 +217,7 @@ def grasp(
         outcomes=statuses,
         advice=advice_for(problem),
         kept=kept,
+        required={"guess": guess} if guess else {},
         console=console,
     )
     if not report.succeeded:

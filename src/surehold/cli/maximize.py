@@ -10,6 +10,7 @@ from surehold.cli.options import (
     Constraint,
     Failures,
     First,
+    Guess,
     Initial,
     Method,
     Noise,
@@ -86,6 +87,7 @@ def maximize(
     failures: Failures = "",
     safety: Safety = 0.0,
     first: First = None,
+    guess: Guess = "",
     outcome: Annotated[
         str, typer.Option(help="What a trial gives: value, or success (your function returns True or False).")
     ] = "value",
@@ -139,7 +141,7 @@ def maximize(
         risk=asked,
         tolerate_failures=tolerate_failures,
         kept=kept,
-        required=limits_given(constraint, allowed, feasible, failures, safety, first)
+        required=limits_given(constraint, allowed, feasible, failures, safety, first, guess)
         | ({"surrogate": surrogate} if surrogate else {})
         | border,
     )

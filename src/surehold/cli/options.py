@@ -14,6 +14,7 @@ __all__ = [
     "Constraint",
     "Failures",
     "First",
+    "Guess",
     "Initial",
     "Method",
     "Noise",
@@ -104,6 +105,13 @@ Safety = Annotated[
 First = Annotated[
     list[str] | None,
     typer.Option(help="To be tried first, NAME=VALUE,... of all variables. Repeatable.", show_default=False),
+]
+Guess = Annotated[
+    str,
+    typer.Option(
+        help="Where the optimum may be, NAME=VALUE,... of some variables: two of three initial trials keep these.",
+        show_default=False,
+    ),
 ]
 RiskMeasure = Annotated[
     str,
@@ -199,6 +207,7 @@ def limits_given(
     failures: str = "",
     safety: float = 0.0,
     first: list[str] | None = None,
+    guess: str = "",
 ) -> dict[str, Any]:
     """Return the settings of an `Optimizer` that the options stand for, those that were not given left out.
 
@@ -217,16 +226,17 @@ def limits_given(
     for text in allowed or ():
         Linear.parse(text)
     given: dict[str, Any] = {"constraints": limits, "allowed": list(allowed or ()), "feasible": feasible}
-    given |= {"failures": failures, "safety": safety, "initial_points": [_point(text) for text in first or ()]}
+    given |= {"failures": failures, "safety": safety, "guess": _values(guess, "--guess") if guess else {}}
+    given |= {"initial_points": [_values(text, "--first") for text in first or ()]}
     return {name: value for name, value in given.items() if value}
 
 
-def _point(text: str) -> dict[str, float | str]:
-    """Return {name: value} of --first NAME=VALUE,...; what is no number is a choice."""
+def _values(text: str, option: str) -> dict[str, float | str]:
+    """Return {name: value} of an option NAME=VALUE,...; what is no number is a choice."""
     from surehold.studies.parameter_text import parse_assignments
 
     found: dict[str, float | str] = {}
-    for name, value in parse_assignments(text, "--first").items():
+    for name, value in parse_assignments(text, option).items():
         try:
             found[name] = float(value)
         except ValueError:

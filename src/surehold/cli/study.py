@@ -8,7 +8,7 @@ import typer
 
 from surehold.amounts import amount
 from surehold.cli import study_people, study_service
-from surehold.cli.options import Allowed, Constraint, Failures, First, RiskMeasure, Safety, Surrogate
+from surehold.cli.options import Allowed, Constraint, Failures, First, Guess, RiskMeasure, Safety, Surrogate
 from surehold.cli.study_options import Json, Name, Outputs, Storage, nothing_said, opened, quiet, say, write_out
 
 __all__ = ["studies"]
@@ -83,6 +83,7 @@ def create(
     failures: Failures = "",
     safety: Safety = 0.0,
     first: First = None,
+    guess: Guess = "",
     outcome: Annotated[
         str, typer.Option(help="Of a trial: value, or success (tell success, failure or 7/10).")
     ] = "value",
@@ -104,7 +105,7 @@ def create(
     optimizer |= {} if asked is None or asked.name == "mean" else {"risk": asked}
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
     optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
-    optimizer |= limits_given(constraint, allowed, feasible, failures, safety, first)
+    optimizer |= limits_given(constraint, allowed, feasible, failures, safety, first, guess)
     input_noise = noise_of(_NOISE if noise is None else noise, "bo")
     if space.box is None or space.box.numbers is None:
         if input_noise is not None and noise is not None:

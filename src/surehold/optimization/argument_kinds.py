@@ -42,6 +42,7 @@ _TEXT: Final = (_text, "a name")
 _NAME: Final = (_text_or_none, "a name, or None")
 _FLAG: Final = (_flag, "True or False")
 _NUMBER: Final = (_number, "a number")
+_VALUES: Final = (lambda value: value is None or isinstance(value, Mapping), "{name: value}, or None")
 _KINDS: Final[dict[str, tuple[Callable[[Any], bool], str]]] = {
     "direction": _TEXT,
     "design": _TEXT,
@@ -69,7 +70,8 @@ _KINDS: Final[dict[str, tuple[Callable[[Any], bool], str]]] = {
         ),
         "a name, an object such as surehold.GaussianProcess(), or None",
     ),
-    "fixed": (lambda value: value is None or isinstance(value, Mapping), "{name: value}, or None"),
+    "fixed": _VALUES,
+    "guess": _VALUES,
     "output_range": (_pair, "(lowest, highest) value to expect, or None"),
 }
 

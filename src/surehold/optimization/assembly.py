@@ -20,12 +20,13 @@ from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.argument_kinds import check_kinds
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.input import Region, region_of
-from surehold.optimization.lattice import Lattice, lattice_of
+from surehold.optimization.lattice import Lattice, lattice_of, places_of
 from surehold.optimization.limits import Limit, limits_of
 from surehold.optimization.noise.input_noise import InputNoise, noise_of_coordinates
 from surehold.optimization.requirements import Requirements
 from surehold.optimization.response_model import ResponseModel, chosen_surrogate
 from surehold.optimization.strategy.initial_design import design as initial_design
+from surehold.optimization.strategy.initial_design import drawn_to
 from surehold.optimization.strategy.named import strategy_named
 from surehold.optimization.strategy.protocol import Strategy
 from surehold.optimization.strategy.thesis import thesis_preset
@@ -173,6 +174,8 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
         )
     rng = np.random.default_rng([seed, 0])
     rest = initial_design(s.design, max(n_initial - len(first), 1), box.dimension, rng)
+    if s.guess:
+        rest = drawn_to(_guess(s, box), rest)
     if requirements is not None:
         rest = requirements.initial(rest, first, rng)
     if lattice is not None and thesis is None and not strategy.ranking.noisy:
@@ -219,6 +222,16 @@ def _check(s: SimpleNamespace, d: int) -> None:
         raise InputError(f"k is {s.k!r}; with {d} coordinates it must be a finite number above {-d}.")
     if s.kappa < 0.0:
         raise InputError(f"kappa is {s.kappa!r}; give standard deviations to be added, 0 or more.")
+
+
+def _guess(s: SimpleNamespace, box: Box) -> NDArray[np.float64]:
+    """Return where the guess is in the unit cube, (d,), nan where none is made."""
+    if s.safety is not None:
+        raise InputError("guess is of the initial design, of which there is none with safety=; leave one of them out.")
+    for name in s.guess:
+        if name in (s.fixed or ()):
+            raise InputError(f"'{name}' has a fixed value and a guess; take it out of one of the two.")
+    return places_of(box, "guess", s.guess)
 
 
 def _failures_modelled(s: SimpleNamespace) -> float:

@@ -20,7 +20,7 @@ Allowed = Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None
 
 _SOME: Final = 1024  # random points among which one is sought that has not been tried
 
-__all__ = ["Lattice", "LatticePosterior", "lattice_of"]
+__all__ = ["Lattice", "LatticePosterior", "lattice_of", "places_of"]
 
 
 @dataclass(frozen=True)
@@ -76,26 +76,39 @@ def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | No
     lattice = None if box.smooth.all() else Lattice(box.snap, box.smooth)
     if not fixed:
         return lattice
-    variables = {variable.name: variable for variable in box.variables}
-    kept: dict[str, Any] = {}
-    for name, value in fixed.items():
-        if name not in variables:
-            raise unknown_name("fixed variable", name, variables)
-        if box.uncontrolled is not None and box.uncontrolled.held[box.columns(name)].any():
-            raise InputError(f"fixed names '{name}', which is uncontrolled: nobody sets it; leave it out.")
-        kept[name] = variables[name].checked(value, "fixed")
-    x = box.points({**box.as_dict(box.from_unit(np.full(box.dimension, 0.5))), **kept})
-    held = np.zeros(box.dimension, dtype=bool)
-    for name in fixed:
-        held[box.columns(name)] = True
+    values = places_of(box, "fixed", fixed)
+    held = ~np.isnan(values)
     if held.all():
         raise InputError("every variable is fixed; there is nothing to optimize.")
-    values = np.clip(box.to_unit(x), 0.0, 1.0)
 
     def snap(U: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.where(held, values, U if lattice is None else lattice.snap(U))
 
     return Lattice(snap, ~held if lattice is None else lattice.smooth & ~held)
+
+
+def places_of(box: Box, argument: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Return where values {name: value} are in the unit cube, (d,); nan in coordinates of other variables.
+
+    Raises
+    ------
+    InputError
+        That names the argument, if a name is unknown, nobody sets that variable, or a value cannot be tried.
+    """
+    variables = {variable.name: variable for variable in box.variables}
+    kept: dict[str, Any] = {}
+    for name, value in values.items():
+        if name not in variables:
+            raise unknown_name(f"{argument} variable", name, variables)
+        if box.uncontrolled is not None and box.uncontrolled.held[box.columns(name)].any():
+            raise InputError(f"{argument} names '{name}', which is uncontrolled: nobody sets it; leave it out.")
+        kept[name] = variables[name].checked(value, argument)
+    x = box.points({**box.as_dict(box.from_unit(np.full(box.dimension, 0.5))), **kept})
+    places = np.full(box.dimension, np.nan)
+    for name in kept:
+        own = box.columns(name)
+        places[own] = np.clip(box.to_unit(x), 0.0, 1.0)[own]
+    return places
 
 
 class LatticePosterior:

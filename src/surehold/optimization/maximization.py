@@ -215,8 +215,8 @@ def maximize(
         Whether a progress bar is shown once a run takes more than two seconds; by default where there is no callback
         and the output is a terminal.
     **settings
-        Of `Optimizer`: input_noise, surrogate, criterion, n_initial, initial_points, fixed, allowed, constraints, seed,
-        noise, preset, ...
+        Of `Optimizer`: input_noise, surrogate, criterion, n_initial, initial_points, guess, fixed, allowed,
+        constraints, seed, noise, preset, ...
 
     Ctrl-C ends the run and keeps what was done.
 

@@ -78,6 +78,10 @@ class Optimizer(Record):
     initial_points
         Points to be tried first, (i, d) or a list of whatever `tell` takes as x; they count as trials of the initial
         design, whose rest follows.
+    guess
+        {name: value} of variables of which it is known where the optimum may be: two of three trials of the initial
+        design keep these values, the third is anywhere. Where all variables are named, one trial is made there, and
+        the others of the two thirds around it. After the initial design it counts no more.
     fixed
         {name: value} of variables that keep this value in every trial.
     design
@@ -172,6 +176,7 @@ class Optimizer(Record):
         criterion: str | None = None,
         n_initial: int | None = None,
         initial_points: Any = None,
+        guess: Mapping[str, Any] | None = None,
         fixed: Mapping[str, Any] | None = None,
         design: str = "latin_hypercube",
         seed: int = 0,

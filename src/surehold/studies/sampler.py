@@ -31,7 +31,7 @@ from surehold.studies.search_space import SearchSpace
 __all__ = ["Sampler"]
 
 #: Settings that are about the variables, which a sampler without a search space does not know yet.
-_OF_VARIABLES: Final = ("allowed", "fixed", "initial_points", "safety")
+_OF_VARIABLES: Final = ("allowed", "fixed", "guess", "initial_points", "safety")
 _log = logging.get_logger(__name__)
 
 
@@ -58,7 +58,7 @@ class Sampler(BaseSampler):
         Whether to warn when a parameter is drawn at random because it is not in the search space.
     **settings
         Of `Optimizer`: criterion, n_initial, design, noise, output_range, quadrature, k, border, kappa, risk, preset,
-        allowed, constraints, feasible, safety, failures, initial_points, outcome. A function `allowed` takes the
+        allowed, constraints, feasible, safety, failures, initial_points, guess, outcome. A function `allowed` takes the
         parameters {name: value}. The further outputs of a trial are its attributes of that name:
         `trial.set_user_attr("torque", 3.1)`. The chains of the thesis presets start anew for every suggestion.
 

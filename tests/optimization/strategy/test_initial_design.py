@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
-from surehold.optimization.strategy.initial_design import DESIGNS, design
+from surehold.optimization.strategy.initial_design import DESIGNS, design, drawn_to
 
 
 @pytest.mark.parametrize("name", DESIGNS)
@@ -32,3 +32,23 @@ def test_sobol_covers_better_than_chance():
 def test_unknown_name():
     with pytest.raises(InputError, match="latin_hypercube"):
         design("grid", 3, 2, np.random.default_rng(0))
+
+
+def test_two_of_three_points_keep_a_guess_and_the_third_is_anywhere():
+    points = design("latin_hypercube", 12, 3, np.random.default_rng(0))
+    moved = drawn_to(np.array([np.nan, 0.25, 1.0]), points)
+    kept = np.arange(12) % 3 != 2
+    np.testing.assert_array_equal(moved[kept, 1:], np.broadcast_to([0.25, 1.0], (8, 2)))
+    np.testing.assert_array_equal(moved[~kept], points[~kept])
+    np.testing.assert_array_equal(moved[:, 0], points[:, 0])
+
+
+def test_around_a_guess_of_all_coordinates_no_two_points_are_the_same():
+    points = design("latin_hypercube", 12, 2, np.random.default_rng(0))
+    guess = np.array([0.3, 0.9])
+    moved = drawn_to(guess, points)
+    np.testing.assert_array_equal(moved[0], guess)
+    np.testing.assert_array_equal(moved[2::3], points[2::3])
+    assert len(np.unique(moved, axis=0)) == 12
+    share = np.linalg.norm(moved - guess, axis=1) / np.linalg.norm(points - guess, axis=1)
+    np.testing.assert_allclose(share[np.arange(12) % 3 != 2], np.array([0, 1, 3, 4, 6, 7, 9, 10]) / 24)

@@ -58,6 +58,19 @@ def test_dz_spans_the_published_distances():
     assert farthest == pytest.approx(depth / 3 + 0.040 * (1 + depth / 0.050))
 
 
+def test_the_guess_is_the_default_pose_of_what_is_free_but_the_place_on_the_facet():
+    assert GraspProblem("mug").guess == {}
+    every = GraspProblem("mug", variables=("dx", "dy", "dz", "rx", "ry", "rz", "s1"))
+    assert every.guess == {"dz": 0.0, "rx": 0.0, "ry": 0.0, "rz": 0.0, "s1": every.default.s1}
+    x = [-0.057, 0.002, *every.guess.values()]
+    assert every.pose(x) == GraspProblem("mug").pose(x[:2])
+    near = GraspProblem("mug", variables=("dx", "rz", "s1"), bounds={"rz": (0.2, 0.4)}, fixed={"dy": 0.01})
+    assert near.guess == {"rz": 0.2, "s1": near.default.s1}, "as near as the bounds allow"
+    for name in ("bottle", "glass", "drill"):
+        problem = GraspProblem(name, variables=("dx", "dy", "dz", "rx", "ry", "rz", "s1"))
+        assert problem.box.contains([0.0, 0.0, *problem.guess.values()], tolerance=0.0)
+
+
 def test_default_starts_30_to_70_percent_free_of_collision(mug):
     rng = np.random.default_rng(0)
     points = mug.box.from_unit(rng.uniform(size=(300, 2)))

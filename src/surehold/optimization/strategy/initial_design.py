@@ -5,9 +5,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import GUESS_TURN
 from surehold.errors import InputError, unknown_name
 
-__all__ = ["DESIGNS", "design"]
+__all__ = ["DESIGNS", "design", "drawn_to"]
 
 DESIGNS: Final = ("latin_hypercube", "sobol", "uniform")
 _MOST: Final = 100_000  # points; they are drawn at once, and n_initial=10**9 is a slip of the pen
@@ -33,3 +34,18 @@ def design(name: str, n: int, dimension: int, rng: np.random.Generator) -> NDArr
     if name == "uniform":
         return rng.random((n, dimension))
     raise unknown_name("initial design", name, DESIGNS)
+
+
+def drawn_to(guess: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a design (n, d), moved to a guess (d,) of where the optimum is; nan in coordinates of which none is made.
+
+    Of `GUESS_TURN` points in turn all but the last keep the guess; that one stays where it is, for the model has to
+    learn what these coordinates do. Where the guess is of all of them, only the first point is there, and the others
+    that are moved lie around it, farther and farther away, at up to half of their distance.
+    """
+    numbers = np.arange(len(points))
+    moved = numbers % GUESS_TURN != GUESS_TURN - 1
+    known = ~np.isnan(guess)
+    share = 0.5 * numbers / len(points) if known.all() else np.zeros(len(points))
+    kept = np.where(known, guess + share[:, None] * (points - guess), points)
+    return np.where(moved[:, None], kept, points)

@@ -166,6 +166,20 @@ class GraspProblem:
             self._simulator = self._build()
         return self._simulator
 
+    @property
+    def guess(self) -> dict[str, float]:
+        """What is known of good grasps before any trial, {name: value} of the free variables but dx and dy, m or rad.
+
+        The palm is square to its facet, at the default standoff and posture, or as near to them as the bounds allow;
+        where on the facet is not known. `Optimizer(guess=...)` takes it.
+        """
+        bounds = zip(self.box.names, self.box.lower, self.box.upper, strict=True)
+        return {
+            name: float(np.clip(self._fixed.get(name, 0.0), lower, upper))
+            for name, lower, upper in bounds
+            if name not in ("dx", "dy")
+        }
+
     def warm_up(self) -> None:
         """Compile what a trial needs, if it is not yet in the cache: some seconds once for an installation."""
         self.simulator.warm_up()
