@@ -68,6 +68,48 @@ def test_parameters_of_a_risk_may_be_of_numpy(tmp_path):
     assert Optimizer.load(tmp_path / "run.json").risk == Risk("cvar", alpha=0.25)
 
 
+@pytest.mark.parametrize("name", ["risk", "linear", "input noise", "object that is not stored"])
+def test_users_choose_the_names_of_outputs_and_fixed_variables(tmp_path, name):
+    box = Box({name: (0.0, 1.0), "x": (0.0, 1.0)})
+    optimizer = Optimizer(box, fixed={name: 0.25})
+    optimizer.tell(optimizer.ask(), 1.0)
+    optimizer.save(tmp_path / "fixed.json")
+    assert np.array_equal(Optimizer.load(tmp_path / "fixed.json").X, optimizer.X)
+    optimizer = Optimizer(BOX, constraints={name: (None, 3.0)})
+    optimizer.tell(optimizer.ask(), 1.0, constraints={name: 2.0})
+    optimizer.save(tmp_path / "outputs.json")
+    assert Optimizer.load(tmp_path / "outputs.json").outputs[name].tolist() == [2.0]
+
+
+def test_values_stay_as_told_where_the_direction_is_replaced(tmp_path):
+    optimizer = used()
+    optimizer.save(tmp_path / "run.json")
+    turned = Optimizer.load(tmp_path / "run.json", direction="minimize")
+    assert np.array_equal(turned.y, optimizer.y, equal_nan=True)
+    lowest = int(np.nanargmin(turned.y))
+    assert turned.recommend().observed == optimizer.y[lowest]
+
+
+def test_outputs_stay_those_of_their_names_where_constraints_are_replaced(tmp_path):
+    optimizer = Optimizer(BOX, constraints={"torque": (None, 3.0), "force": (None, 50.0)})
+    for torque in (1.0, 2.0):
+        optimizer.tell(optimizer.ask(), 1.0, constraints={"torque": torque, "force": None if torque > 1.0 else 40.0})
+    optimizer.tell(optimizer.ask(), failed=True)
+    optimizer.save(tmp_path / "run.json")
+    others = {"force": (None, 45.0), "heat": (None, 1.0), "torque": (None, 3.0)}
+    outputs = Optimizer.load(tmp_path / "run.json", constraints=others).outputs
+    assert np.array_equal(outputs["torque"], [1.0, 2.0, np.nan], equal_nan=True)
+    assert np.array_equal(outputs["force"], [40.0, np.nan, np.nan], equal_nan=True)
+    assert np.isnan(outputs["heat"]).all()
+    assert Optimizer.load(tmp_path / "run.json", constraints=None).outputs == {}
+
+
+def test_the_box_cannot_be_replaced(tmp_path):
+    used().save(tmp_path / "run.json")
+    with pytest.raises(InputError, match="box cannot be replaced"):
+        Optimizer.load(tmp_path / "run.json", box=BOX)
+
+
 def test_before_any_trial(tmp_path):
     Optimizer(BOX, seed=2).save(tmp_path / "run.json")
     assert np.array_equal(Optimizer.load(tmp_path / "run.json").ask(), Optimizer(BOX, seed=2).ask())

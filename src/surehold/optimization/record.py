@@ -256,12 +256,13 @@ class Record(ABC):
         """Return the optimizer that `save` has written: it asks and recommends what that one would.
 
         Settings that are given replace stored ones; those that a file cannot hold must be: a surrogate that is an
-        object, input noise that varies. (The chains of the thesis presets start anew.)
+        object, input noise that varies. (The chains of the thesis presets start anew.) What was told stays as it was
+        told: values where `direction` is replaced, and the outputs of `constraints` that keep their names.
 
         Raises
         ------
         InputError
-            If the file cannot be read or holds no optimizer, or such a setting is missing.
+            If the file cannot be read or holds no optimizer, or such a setting is missing; for another box.
 
         Examples
         --------
@@ -275,11 +276,16 @@ class Record(ABC):
         >>> bool(again.ask() == optimizer.ask())
         True
         """
+        if "box" in settings:
+            raise InputError(
+                "box cannot be replaced: stored inputs are points of it. Make an Optimizer of the other box, and tell "
+                "it X and y of the stored one, or restore them."
+            )
         box, found, trials = saving.read(path, settings)
-        known = signature(cls).parameters
+        known = tuple(signature(cls).parameters)[1:]
         for name in found:
             if name not in known:
-                raise unknown_name(f"setting of an optimizer, in {os.fspath(path)!r},", name, tuple(known)[1:])
+                raise unknown_name(f"setting of an optimizer, in {os.fspath(path)!r},", name, known)
         optimizer = cls(box, **found)
         optimizer._trials = trials
         return optimizer

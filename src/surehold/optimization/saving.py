@@ -76,6 +76,9 @@ def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], t
 def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, dict[str, Any], Trials]:
     """Return the box, the settings, those `given` in place of stored ones, and the trials that a file holds.
 
+    Where other `constraints` are given the outputs stay those of their names: one that is new was not measured, one
+    that is left out is dropped. Where the other `direction` is given values stay as they were told.
+
     Raises
     ------
     InputError
@@ -99,15 +102,22 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
         box = Box(data["box"], uncontrolled=given_conditions)
         settings = {name: _restored(name, value) for name, value in {**data["settings"], **given}.items()}
         told, pending = data["trials"], data["pending"]
-        limits = limits_of(settings.get("constraints"))
+        limits, stored = limits_of(settings.get("constraints")), list(data["settings"].get("constraints") or ())
+        columns = [stored.index(limit.name) if limit.name in stored else len(stored) for limit in limits]
+        outputs = [[*trial.get("outputs", [np.nan] * len(stored)), np.nan] for trial in told]
+        if any(len(row) != len(stored) + 1 for row in outputs):
+            raise ValueError("a trial has more or fewer outputs than there are constraints")
+        # What is stored is in the sign in which it is maximized.
+        same = settings.get("direction", "maximize") == data["settings"].get("direction", "maximize")
+        sign = 1.0 if same else -1.0
         trials = Trials(box, limits, settings.get("outcome", "value") != "value")
         trials.restore_cube(
             [trial["commanded"] for trial in told],
-            [np.nan if trial["value"] is None else trial["value"] for trial in told],
+            [np.nan if trial["value"] is None else sign * trial["value"] for trial in told],
             [trial["reached"] for trial in told],
             [trial["commanded"] for trial in pending],
             [trial["number"] for trial in [*told, *pending]],
-            np.array([trial.get("outputs", []) for trial in told], dtype=np.float64).reshape(len(told), len(limits)),
+            np.array([[row[k] for k in columns] for row in outputs], dtype=np.float64).reshape(len(told), len(limits)),
             np.array([trial.get("executions", 1) for trial in told], dtype=np.intp),
             np.array([trial.get("noise", 0.0) for trial in told], dtype=np.float64),
             data.get("preferences", ()),
@@ -148,16 +158,18 @@ def _plain(value: Any) -> Any:
 
 
 def _restored(name: str, value: Any) -> Any:
-    if isinstance(value, dict) and _OBJECT in value:
+    if name in ("constraints", "fixed") or not isinstance(value, (dict, list)):  # of which users choose the names
+        return value
+    if isinstance(value, list):
+        return [_restored(name, entry) for entry in value] if name == "allowed" else value
+    if _OBJECT in value:
         raise InputError(
             f"{name} was {value[_OBJECT]}, which a file does not hold; say Optimizer.load(path, {name}=...)."
         )
-    if isinstance(value, dict) and "input noise" in value:
+    if "input noise" in value:
         return InputNoise.from_json(value["input noise"])
-    if isinstance(value, dict) and "risk" in value:
+    if "risk" in value:
         return Risk(**value["risk"])
-    if isinstance(value, dict) and "linear" in value:
+    if "linear" in value:
         return Linear(**value["linear"])
-    if name == "allowed" and isinstance(value, list):
-        return [_restored(name, entry) for entry in value]
     return value
