@@ -154,3 +154,54 @@ def test_a_trial_that_the_rig_lost_says_nothing_of_its_condition():
     optimizer = Optimizer(BRANIN, conditions="measured", n_initial=4)
     optimizer.tell(optimizer.ask(), failed="rig")
     assert not len(optimizer.y)
+
+
+def where_it_goes(x):
+    """The noise of x under a load: none at 0.2, a tenth of the box at 0.8."""
+    return {"x": 0.1 * (x[1] - 0.2) / 0.6, "load": 0.0}
+
+
+LOADED = Box({"x": (0.0, 1.0), "load": (0.0, 1.0)}, uncontrolled={"load": [0.2, 0.8]})
+
+
+def test_noise_that_varies_is_that_under_each_condition():
+    optimizer = Optimizer(LOADED, input_noise=InputNoise.varying(where_it_goes), seed=0)
+    for x in np.random.default_rng(0).random((30, 2)):
+        optimizer.tell(x, -((x[0] - 0.5) ** 2))
+    mean, _ = optimizer.predict([[0.5, 0.5]], under_noise=True)
+    assert mean[0] == pytest.approx(-(0.0**2 + 0.1**2) / 2.0, rel=0.03)  # that of the mean load is 0.05**2
+
+
+def test_trials_that_tell_their_condition_alone_have_strayed_in_the_rest():
+    noise = InputNoise({"x": 0.05, "load": 0.3})  # a condition is as it is: what is said of its noise is passed over
+    settings = {"input_noise": noise, "noise_while_exploring": True, "noise": 0.01, "seed": 0}
+    measured, commanded = Optimizer(LOADED, conditions="measured", **settings), Optimizer(LOADED, **settings)
+    for x in np.random.default_rng(0).random((12, 2)):
+        measured.tell([x[0], 0.5], np.sin(9.0 * x[0]) * x[1], reached={"load": x[1]})
+        commanded.tell(x, np.sin(9.0 * x[0]) * x[1])
+    X = np.random.default_rng(1).random((9, 2))
+    assert np.array_equal(measured.predict(X), commanded.predict(X))
+
+
+def test_conditions_are_no_input_noise():
+    rng = np.random.default_rng(0)
+    optimizer = Optimizer(LOADED, conditions="measured", seed=0)
+    strays = 0.03 * rng.standard_normal(40)
+    for x, stray in zip(rng.random(40), strays, strict=True):
+        optimizer.tell([x, 0.5], x, reached={"x": x + stray, "load": rng.choice([0.2, 0.8])})
+    covariance = optimizer.estimate_input_noise().unit_covariance(LOADED)
+    assert covariance == pytest.approx(np.diag([np.mean(strays**2), 0.0]))
+    untold = Optimizer(LOADED, conditions="measured", seed=0)
+    for load in (0.2, 0.8, 0.2, 0.8, 0.2, 0.8):
+        untold.tell([0.4, 0.5], load, reached={"load": load})
+    with pytest.raises(InputError, match="tell reached= with all variables"):
+        untold.estimate_input_noise()
+
+
+def test_a_condition_may_lie_beyond_its_range():
+    optimizer = Optimizer(LOADED, conditions="measured", seed=0)
+    for x in np.linspace(0.0, 1.0, 6):
+        optimizer.tell([x, 0.5], -((x - 0.4) ** 2), reached={"load": 1.3 if x == 0.4 else 0.5})
+    best = optimizer.recommend()
+    assert best.x[0] == pytest.approx(0.4)
+    assert not best.refused, "the best trial was recommended: its condition is not the answer's to choose"

@@ -7,6 +7,15 @@ from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems import GM, RKHS, Function, perturbed_points, robust_score
 
 
+def test_noise_that_varies_is_drawn_under_each_condition():
+    box = Box({"grip": (0.0, 1.0), "load": (0.0, 1.0)}, uncontrolled={"load": [0.2, 0.8]})
+    noise = InputNoise.varying(lambda x: {"grip": 0.1 if x[1] > 0.5 else 0.0, "load": 0.0})
+    points = perturbed_points([0.5, 0.5], box, noise, 2000, border="extend")
+    light, heavy = (points[np.isclose(points[:, 1], load), 0] for load in (0.2, 0.8))
+    assert np.all(light == 0.5)
+    assert heavy.std() == pytest.approx(0.1, rel=0.1)
+
+
 def test_score_converges_to_the_closed_form():
     p, noise = GM(), InputNoise.unit(0.05)
     x = [0.45, 0.48]

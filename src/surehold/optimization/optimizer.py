@@ -327,12 +327,13 @@ class Optimizer(Record):
                 rng = self._rng(3, len(self._trials))
                 strict = None if self._requirements is None else self._requirements.strict(self._trials)
                 u, observed = self._snapped(ranking.best(posterior, history, rng, strict)), np.nan
-            if self.box.uncontrolled is not None:
-                u = self.box.uncontrolled.at_mean(u)
             best = int(np.argmax(history.observed))
             highest, top = (history.tried[best], float(history.observed[best])), int(np.nanargmax(self._trials.values))
             if self._trials.values[top] > highest[1]:  # which is no answer
                 highest = self._trials.reached[top], float(self._trials.values[top])
+            if self.box.uncontrolled is not None:  # settings are compared, under all conditions
+                u = self.box.uncontrolled.at_mean(u)
+                highest = self.box.uncontrolled.at_mean(highest[0]), highest[1]
             answer = recommendation(
                 posterior,
                 reached,

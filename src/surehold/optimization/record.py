@@ -232,15 +232,22 @@ class Record(ABC):
             If there are neither; it says what to tell.
         """
         told, reported = self._trials.successful, self._trials.reported
+        held = self.box.uncontrolled
         if reported.any():
             numbers = self.box.numbers
             if numbers is None:
                 raise InputError("all variables are choices, which carry no input noise.")
             shown = [self.box.names.index(name) for name in numbers.names]
-            commanded, reached = (
-                points[reported][:, shown] for points in (self._trials.commanded, self._trials.reached)
-            )
+            commanded, reached = self._trials.commanded[reported], self._trials.reached[reported]
+            if held is not None:  # conditions differ, which is no noise
+                reached[:, held.held] = commanded[:, held.held]
+            commanded, reached = commanded[:, shown], reached[:, shown]
             return noise_from_reached(numbers, commanded, reached)
+        if self._conditions_measured:
+            raise InputError(
+                "no trial tells where it went but for its conditions, by which values of one input differ, too: tell "
+                "reached= with all variables."
+            )
         with computing():
             return noise_from_repeats(self._trials.commanded[told], self._trials.values[told])
 

@@ -32,6 +32,7 @@ from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.output_models import OutputModels
 from surehold.optimization.recommendation import OUTSIDE, Recommendation, execution_at
+from surehold.optimization.response_model import expected_places
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
 from surehold.optimization.trials import Trials, same
@@ -167,7 +168,8 @@ class Requirements:
         if not self.model_failures(trials):
             return None
         if self._success is None or self._success[0] != len(trials):
-            self._success = (len(trials), SuccessModel(trials.reached, trials.successful))
+            places = expected_places(trials, self._straying, self._box)
+            self._success = (len(trials), SuccessModel(places, trials.successful))
         return self._success[1]
 
     def shortfall(self, trials: Trials) -> str:

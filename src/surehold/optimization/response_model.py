@@ -25,7 +25,7 @@ from surehold.optimization.surrogates.success.preference import PreferenceProces
 from surehold.optimization.trials import Trials
 from surehold.store import background
 
-__all__ = ["ResponseModel", "chosen_surrogate"]
+__all__ = ["ResponseModel", "chosen_surrogate", "expected_places"]
 
 _SAME_PLACE: Final = 1e-7  # in the unit cube
 _SAME_VALUE: Final = 1e-9  # of the values' range
@@ -61,6 +61,18 @@ def chosen_surrogate(
         refuse_settings(f"preset='{preset}'", noise, output_range)
         return thesis.surrogate(surrogate, deviations, seed)
     return surrogate_named(surrogate, noise=noise, output_range=output_range, input_deviations=deviations, seed=seed)
+
+
+def expected_places(trials: Trials, straying: InputNoise | None, box: Box) -> NDArray[np.float64]:
+    """Return where trials were (t, d): the reached input where it was told, else where noise of that mean carries it.
+
+    `straying` is the input noise of the trials themselves; None if they reach what is commanded.
+    """
+    if straying is None or not (mean := straying.unit_mean(box)).any():
+        return trials.reached
+    if box.uncontrolled is not None:  # which are as they were told, or commanded
+        mean = np.where(box.uncontrolled.held, 0.0, mean)
+    return np.where(trials.reported[:, None], trials.reached, trials.reached + mean)
 
 
 class ResponseModel:
@@ -164,10 +176,9 @@ class ResponseModel:
         if tail is not None:
             values = tail.apply(values)
         if self._straying is not None and isinstance(self._surrogate, NoisySurrogate):
-            roots = self._straying.unit_roots(self._box, trials.commanded).copy()
-            roots[trials.reported] = 0.0
             told = trials.deviations if self._told else None
-            return condition_on_noisy_inputs(self._surrogate, trials.reached, values, roots, [self._seed, 1, 0], told)
+            places, roots = expected_places(trials, self._straying, self._box), self._roots(trials, self._straying)
+            return condition_on_noisy_inputs(self._surrogate, places, values, roots, [self._seed, 1, 0], told)
         # One random stream for all, so that what some trials taught stays as it was when others follow.
         previous = self._cache[False][1] if self._continues_chains and self._cache else None
         rng = np.random.default_rng([self._seed, 1, len(trials) if self._continues_chains else 0])
@@ -175,6 +186,17 @@ class ResponseModel:
             return self._surrogate.condition(trials.reached, values, rng, previous, trials.deviations)
         told = self._informative(trials)
         return self._surrogate.condition(trials.reached[told], values[told], rng, previous)
+
+    def _roots(self, trials: Trials, straying: InputNoise) -> NDArray[np.float64]:
+        """Return roots (t, d, d) of the covariances with which trials strayed; 0 where they told what they reached."""
+        held = self._box.uncontrolled
+        if held is None:
+            roots = straying.unit_roots(self._box, trials.commanded).copy()
+        else:  # which are as they were told, or commanded
+            roots = straying.unit_roots(self._box, np.where(held.held, trials.reached, trials.commanded)).copy()
+            roots[:, held.held] = 0.0
+        roots[trials.reported] = 0.0
+        return roots
 
     def _informative(self, trials: Trials) -> NDArray[np.bool_]:
         """Tell which trials (t,) the surrogate is told: of exact ones of the same place and value, the first.

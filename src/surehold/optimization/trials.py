@@ -84,8 +84,11 @@ class Trials:
 
     @property
     def reported(self) -> NDArray[np.bool_]:
-        """Whether the reached input of each trial was told and is another one, (t,)."""
-        return np.any(self.commanded != self.reached, axis=1)
+        """Whether the reached input of each trial was told and is another one, (t,).
+
+        Of variables that nobody sets the condition alone is told: that says nothing of how far the others strayed.
+        """
+        return np.any((self.commanded != self.reached) & self._set, axis=1)
 
     @property
     def values(self) -> NDArray[np.float64]:
@@ -127,16 +130,22 @@ class Trials:
         """Whether each trial gave a value at an input that can be commanded again, (t,).
 
         Those that reached a place outside of the box teach the model, but are no answer; where all of them did, the
-        nearest points of the box are: see `places`.
+        nearest points of the box are: see `places`. Conditions that nobody sets may lie anywhere.
         """
         successful = self.successful
-        inside = successful & np.all((self.reached >= 0.0) & (self.reached <= 1.0), axis=1)
+        inside = successful & np.all((self.reached >= 0.0) & (self.reached <= 1.0) | ~self._set, axis=1)
         return inside if inside.any() else successful
 
     @property
     def places(self) -> NDArray[np.float64]:
         """Reached inputs (t, d), those outside of the unit cube replaced by the nearest points of it."""
         return np.clip(self.reached, 0.0, 1.0)
+
+    @property
+    def _set(self) -> NDArray[np.bool_]:
+        """Which coordinates are commanded, (d,): not those of variables that nobody sets."""
+        held = self._box.uncontrolled
+        return np.ones(self._box.dimension, dtype=bool) if held is None else ~held.held
 
     @property
     def pending(self) -> NDArray[np.float64]:

@@ -72,15 +72,19 @@ def perturbed_points(
     rng = np.random.default_rng(seed)
     unit, nobody = box.to_unit(center[0]), box.uncontrolled
     reached = np.tile(unit, (int(n), 1))
+    drawn = np.zeros(int(n), dtype=np.intp) if nobody is None else rng.integers(len(nobody.values), size=int(n))
+    if nobody is not None:
+        reached[:, nobody.held] = nobody.samples[drawn]
     if noise is not None or nobody is None:
-        reached = reached + needed_input_noise(noise, box.names).draws(box, unit, int(n), rng)
+        at = unit if nobody is None else reached  # noise that varies may depend on the condition
+        reached = reached + needed_input_noise(noise, box.names).draws(box, at, int(n), rng)
     if border == "extend":
         points = box.lower + reached * box.widths
     else:
         outside = (reached < 0.0) | (reached > 1.0)
         points = np.where(outside, center[0], box.from_unit(np.clip(reached, 0.0, 1.0)))
     if nobody is not None:
-        points[:, nobody.held] = nobody.values[rng.integers(len(nobody.values), size=int(n))]
+        points[:, nobody.held] = nobody.values[drawn]
     return points
 
 

@@ -81,6 +81,21 @@ def test_the_answer_makes_up_for_an_error_that_is_always_on_one_side():
     assert best.std == pytest.approx(f(best.x[0] + errors).std(), abs=0.02)
 
 
+def test_trials_that_strayed_are_learnt_from_where_the_mean_error_carries_them():
+    rng = np.random.default_rng(0)
+    errors = 0.1 + 0.01 * rng.standard_normal(50)  # on average a tenth too far
+    settings = {"input_noise": InputNoise.samples(errors), "noise_while_exploring": True, "noise": 0.01, "seed": 0}
+    optimizer = Optimizer(Box({"a": (0.0, 1.0)}), failures="modelled", **settings)
+    for a in np.linspace(0.0, 0.9, 25):
+        reached = a + rng.choice(errors)
+        optimizer.tell([a], None if reached > 0.8 else reached, failed=bool(reached > 0.8))
+    mean, _ = optimizer.predict([[0.4]])
+    outcome, _ = optimizer.predict([[0.4]], under_noise=True)
+    assert mean[0] == pytest.approx(0.4, abs=0.01)  # f(x) = x
+    assert outcome[0] == pytest.approx(0.4 + errors.mean(), abs=0.01)
+    assert optimizer.recommend().x[0] < 0.7, "from 0.7 on executions reach the places where trials failed"
+
+
 def test_stored_and_restored():
     noise = InputNoise.samples(SKEWED[:10])
     again = InputNoise.from_json(noise.to_json())

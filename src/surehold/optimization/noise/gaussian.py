@@ -26,6 +26,10 @@ class _Gaussian(ABC):
     @abstractmethod
     def unit_covariance(self, box: Box, x: NDArray[np.float64] | None = None) -> NDArray[np.float64]: ...
 
+    def unit_mean(self, box: Box) -> NDArray[np.float64]:
+        """Return the mean (d,), which is 0."""
+        return np.zeros(box.dimension)
+
     def draws(self, box: Box, u: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return n draws (n, d)."""
         return rng.standard_normal((n, box.dimension)) @ root_of(self.unit_covariance(box)).T

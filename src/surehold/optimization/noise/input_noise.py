@@ -104,6 +104,7 @@ class InputNoise:
 
         It returns what the constructor takes at that place: {name: standard deviation}, standard deviations (d,), or a
         covariance (d, d); zeros where there is no noise. What it returns is checked when it is used.
+        Beside uncontrolled variables it is asked under each condition; what it says of their own noise is passed over.
         """
         if not callable(function):
             raise InputError(f"input noise is {function!r}; give a function of x (d,) that returns the noise there.")
@@ -184,6 +185,10 @@ class InputNoise:
         """
         return self.kind.unit_covariance(box, None if x is None else np.asarray(x, dtype=np.float64))
 
+    def unit_mean(self, box: Box) -> NDArray[np.float64]:
+        """Return the mean (d,) in the unit cube of `box`: by how much all trials stray alike. 0 but for samples."""
+        return self.kind.unit_mean(box)
+
     def unit_roots(self, box: Box, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return lower triangular R (q, d, d) with R R' = covariance at points U (q, d) of the unit cube."""
         if not self.varies:
@@ -191,7 +196,7 @@ class InputNoise:
         return np.array([root_of(self.unit_covariance(box, x)) for x in box.from_unit(np.clip(U, 0.0, 1.0))])
 
     def draws(self, box: Box, u: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return n draws (n, d) of the noise at a point u (d,) of the unit cube."""
+        """Return n draws (n, d) of the noise at a point u (d,) of the unit cube, or one at each of n points (n, d)."""
         return self.kind.draws(box, u, n, rng)
 
     def warn_if_larger_than(self, box: Box) -> None:

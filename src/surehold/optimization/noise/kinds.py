@@ -39,8 +39,12 @@ class Kind(Protocol):
         """Return S (d, d) at x (d,) in the box's units; noise that varies takes the middle of the box for None."""
         ...
 
+    def unit_mean(self, box: Box) -> NDArray[np.float64]:
+        """Return the mean of the noise (d,) in the unit cube."""
+        ...
+
     def draws(self, box: Box, u: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return n draws (n, d) of the noise at u (d,) of the unit cube, in widths of the cube."""
+        """Return n draws (n, d) of the noise at u (d,) of the unit cube, or one at each of n, in widths of the cube."""
         ...
 
     def quadrature(self, box: Box, rule: str, k: float, exponent: int) -> tuple[Quadrature, Root | None]:

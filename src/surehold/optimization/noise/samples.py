@@ -41,6 +41,10 @@ class Samples:
         covariance = apart.T @ apart / len(unit)
         return covariance + np.diag(_RIDGE * np.diag(covariance))  # samples may lie on a line
 
+    def unit_mean(self, box: Box) -> NDArray[np.float64]:
+        """Return the mean of the samples (d,) in the unit cube."""
+        return self._unit(box).mean(axis=0)
+
     def draws(self, box: Box, u: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return n of the samples (n, d), drawn with replacement."""
         unit = self._unit(box)

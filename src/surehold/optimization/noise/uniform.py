@@ -26,6 +26,10 @@ class Uniform:
         """Return the covariance (d, d)."""
         return np.diag((in_order(self.deviations, box) / box.widths) ** 2)
 
+    def unit_mean(self, box: Box) -> NDArray[np.float64]:
+        """Return the mean (d,), which is 0."""
+        return np.zeros(box.dimension)
+
     def draws(self, box: Box, u: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
         """Return n draws (n, d)."""
         standard = rng.uniform(-(3.0**0.5), 3.0**0.5, (n, box.dimension))

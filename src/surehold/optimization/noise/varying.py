@@ -29,9 +29,14 @@ class Varying:
         place = box.from_unit(np.full(box.dimension, 0.5)) if x is None else x
         return self._at(place, box).unit_covariance(box)
 
+    def unit_mean(self, box: Box) -> NDArray[np.float64]:
+        """Return the mean (d,), which is 0."""
+        return np.zeros(box.dimension)
+
     def draws(self, box: Box, u: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return n draws (n, d) at u (d,) of the unit cube."""
-        return rng.standard_normal((n, box.dimension)) @ self._roots(box, u[None, :])[0].T
+        """Return n draws (n, d) at u (d,) of the unit cube, or one at each of n points (n, d)."""
+        standard = rng.standard_normal((n, box.dimension))
+        return np.matmul(self._roots(box, np.atleast_2d(u)), standard[:, :, None])[:, :, 0]
 
     def quadrature(self, box: Box, rule: str, k: float, exponent: int) -> tuple[Quadrature, Root | None]:
         """Return the quadrature of standard normal variables and the function that returns their roots.
