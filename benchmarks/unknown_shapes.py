@@ -14,6 +14,7 @@ draws    what a grasp planned on the mean surface is worth: in truth, there, and
          places and their normals, for each place
 explore  from a box: the true worth of the answer after 10, 20, 40, 50 and 80 trials
 search   the same of optimization that learns no shape, and after 100 trials
+guess    the same, of which two of three initial trials keep the default pose (`GraspProblem.guess`)
 time     of an update of the shape in an exploration that has made 200 contacts
 
 Every finished case is a line of the rows' file: a benchmark that is stopped goes on where it was. Cases are numbered by
@@ -24,6 +25,7 @@ import argparse
 import json
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -240,10 +242,11 @@ def explore(objects, args):
     table(args, ("object",))
 
 
-def search(objects, args):
+def search(objects, args, guess=False):
     for key, problem, _ in explored(objects, args):
         real = problem.on(objects[key["object"]])
-        optimizer = sh.Optimizer(problem.box, input_noise=NOISE, seed=key["seed"], n_initial=20)
+        known_before = problem.guess if guess else None
+        optimizer = sh.Optimizer(problem.box, input_noise=NOISE, seed=key["seed"], n_initial=20, guess=known_before)
         row = {}
         for k in range(100):
             x = optimizer.ask()
@@ -319,7 +322,15 @@ def table(args, names):
         print(*group, f"({len(mine)})", ", ".join(shown))
 
 
-RUN = {"shape": shape, "grasp": grasp, "draws": drawn, "explore": explore, "search": search, "time": timed}
+RUN = {
+    "shape": shape,
+    "grasp": grasp,
+    "draws": drawn,
+    "explore": explore,
+    "search": search,
+    "guess": partial(search, guess=True),
+    "time": timed,
+}
 
 
 def main():

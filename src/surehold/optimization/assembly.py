@@ -37,7 +37,7 @@ from surehold.optimization.surrogates.named import TELLABLE
 from surehold.optimization.surrogates.protocol import NoisySurrogate
 from surehold.optimization.surrogates.success.beta_process import BetaProcess
 from surehold.optimization.surrogates.success.preference import PreferenceProcess
-from surehold.optimization.trial_inputs import initial_inputs
+from surehold.optimization.trial_inputs import check_tried, initial_inputs
 
 __all__ = ["Parts", "assembled", "default_n_initial", "whole_number"]
 
@@ -116,6 +116,8 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     if input_noise is not None:
         input_noise.warn_if_larger_than(box)
     lattice = lattice_of(box, s.fixed)
+    if lattice is not None:
+        check_tried(box, first, lattice.snap(first))
     region = region_of(box, s.allowed, lattice, seed, first)
     strategy = strategy_named(
         s.criterion,

@@ -7,11 +7,12 @@ have been perturbed.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import ROUNDED
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions, means
@@ -20,7 +21,7 @@ Allowed = Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None
 
 _SOME: Final = 1024  # random points among which one is sought that has not been tried
 
-__all__ = ["Lattice", "LatticePosterior", "lattice_of", "places_of"]
+__all__ = ["Fixed", "Lattice", "LatticePosterior", "fixed_of", "lattice_of", "places_of"]
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,33 @@ def _key(point: NDArray[np.float64]) -> bytes:
     return (point + 0.0).tobytes()  # -0.0 is 0.0
 
 
+class Fixed(NamedTuple):
+    """Coordinates of the cube that keep their values."""
+
+    held: NDArray[np.bool_]
+    """which they are, (d,)"""
+    values: NDArray[np.float64]
+    """(d,); nan of the others"""
+
+    def keeps(self, U: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which points U (q, d) have these values, but for what a rig rounds: (q,)."""
+        return np.all((np.abs(U - self.values) <= ROUNDED) | ~self.held, axis=1)
+
+
+def fixed_of(box: Box, fixed: Mapping[str, Any] | None) -> Fixed | None:
+    """Return the coordinates of variables that have fixed values {name: value}; None where there are none.
+
+    Raises InputError as `lattice_of` does.
+    """
+    if not fixed:
+        return None
+    values = places_of(box, "fixed", fixed)
+    held = ~np.isnan(values)
+    if held.all():
+        raise InputError("every variable is fixed; there is nothing to optimize.")
+    return Fixed(held, values)
+
+
 def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | None:
     """Return the points of a box that can be tried, those at which variables have fixed values {name: value}.
 
@@ -74,12 +102,10 @@ def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | No
         If a name is unknown, a value is none that can be tried, or no variable is left.
     """
     lattice = None if box.smooth.all() else Lattice(box.snap, box.smooth)
-    if not fixed:
+    constant = fixed_of(box, fixed)
+    if constant is None:
         return lattice
-    values = places_of(box, "fixed", fixed)
-    held = ~np.isnan(values)
-    if held.all():
-        raise InputError("every variable is fixed; there is nothing to optimize.")
+    held, values = constant
 
     def snap(U: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.where(held, values, U if lattice is None else lattice.snap(U))

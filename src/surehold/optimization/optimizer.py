@@ -83,7 +83,8 @@ class Optimizer(Record):
         design keep these values, the third is anywhere. Where all variables are named, one trial is made there, and
         the others of the two thirds around it. After the initial design it counts no more.
     fixed
-        {name: value} of variables that keep this value in every trial.
+        {name: value} of variables that keep this value in every trial that is asked for and in every answer. Trials
+        told at other values teach the model, but are no answer.
     design
         "latin_hypercube" (default), "sobol" or "uniform".
     seed
@@ -308,13 +309,18 @@ class Optimizer(Record):
         Raises
         ------
         InputError
-            If no trial has given a value yet.
+            If no trial has given a value yet, or none at the values of `fixed` variables.
         """
         if where not in ("observed", "box"):
             raise unknown_name("place of the recommendation", where, ("observed", "box"))
         history, ranking = self._history, self._ranking
         with computing():
             posterior = self.posterior
+            if not len(history.tried) and self._requirements is None:
+                raise InputError(
+                    "no trial at the values of fixed variables has given a value yet; ask for one, and tell its "
+                    "outcome."
+                )
             if not len(history.tried) and self._requirements is not None:
                 where, history = "observed", self._requirements.nearest(self._trials)
             reached = self._reached(OUTCOME_EXPONENT)
@@ -322,15 +328,17 @@ class Optimizer(Record):
             finer = self._reached(MEAN_EXPONENT_OF_FEW) if few and not ranking.exact_inputs else None
             if where == "observed":
                 index = int(ranking.order(posterior, history.tried, history.observed)[0])
-                u, observed = history.tried[index], float(history.observed[index])
+                u, observed = self._snapped(history.tried[index]), float(history.observed[index])
             else:
                 rng = self._rng(3, len(self._trials))
                 strict = None if self._requirements is None else self._requirements.strict(self._trials)
                 u, observed = self._snapped(ranking.best(posterior, history, rng, strict)), np.nan
             best = int(np.argmax(history.observed))
             highest, top = (history.tried[best], float(history.observed[best])), int(np.nanargmax(self._trials.values))
-            if self._trials.values[top] > highest[1]:  # which is no answer
+            no_answer = ""
+            if self._trials.values[top] > highest[1]:
                 highest = self._trials.reached[top], float(self._trials.values[top])
+                no_answer = self._trials.why_no_answer(top)
             if self.box.uncontrolled is not None:  # settings are compared, under all conditions
                 u = self.box.uncontrolled.at_mean(u)
                 highest = self.box.uncontrolled.at_mean(highest[0]), highest[1]
@@ -350,6 +358,7 @@ class Optimizer(Record):
                 "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
                 self.risk,
                 ranking.judged(posterior, highest[0], u),
+                no_answer,
             )
             if self._requirements is not None:
                 answer = self._requirements.described(answer, self._trials, u, reached, self._sign)

@@ -23,7 +23,6 @@ from surehold.optimization.surrogates.protocol import Posterior, means
 
 __all__ = [
     "MANY_OUTSIDE",
-    "OUTSIDE",
     "Outcome",
     "Recommendation",
     "execution_at",
@@ -36,8 +35,6 @@ __all__ = [
 ]
 
 _LEVEL: Final = 0.05
-#: Why a trial that reached such a place is no answer.
-OUTSIDE: Final = "reached a place outside of the box."
 #: Share of executions from which it is worth a sentence that they leave the box.
 MANY_OUTSIDE: Final = 0.2
 _SOME_OUTSIDE: Final = 0.01
@@ -267,12 +264,13 @@ def recommendation(
     warning: str = "",
     risk: Risk | None = None,
     by_risk: tuple[float, float] | None = None,
+    no_answer: str = "",
 ) -> Recommendation:
     """Describe u (d,) of the unit cube; `highest` is where the best observed trial was, and its value.
 
     `reached` are the perturbations of one execution, `finer` more of them, for its mean. `sign` is that of the values
     in which the answer is given: -1 where what was told has been turned over. `risk` is the measure by which u was
-    chosen, and `by_risk` what `highest` and u are worth by it; None: the mean.
+    chosen, and `by_risk` what `highest` and u are worth by it; None: the mean. `no_answer` says why `highest` is none.
     """
     outcome = execution_at(posterior, reached, u, noise_variance)
     expectation = expectation_at(posterior, reached, u, finer)
@@ -287,8 +285,8 @@ def recommendation(
         return in_digits(sign * value, outcome.std)
 
     best, worse = ("highest", "less") if sign > 0.0 else ("lowest", "more")
-    if np.any(np.abs(highest[0] - 0.5) > 0.5):
-        refused = f"The {best} observed trial gave {said(highest[1])}, but {OUTSIDE}"
+    if no_answer:
+        refused = f"The {best} observed trial gave {said(highest[1])}, but {no_answer}"
     elif np.any(np.abs(highest[0] - u) > 1e-6):
         other = execution_at(posterior, reached, highest[0], noise_variance)
         expected = expectation_at(posterior, reached, highest[0], finer).mean

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.box import Box
+from surehold.optimization.lattice import fixed_of
 from surehold.optimization.limits import Limit
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise
@@ -48,7 +49,8 @@ class Record(ABC):
         self._sign: Final = 1.0 if self.direction == "maximize" else -1.0
         self._noise_told: Final = settings["noise"] == "told"
         self._conditions_measured: Final = box.uncontrolled is not None and settings["conditions"] == "measured"
-        self._trials = Trials(box, limits, self.outcome != "value")
+        self._fixed: Final = fixed_of(box, settings["fixed"])
+        self._trials = Trials(box, limits, self.outcome != "value", self._fixed)
 
     @abstractmethod
     def _replaced(self) -> None:
@@ -204,7 +206,7 @@ class Record(ABC):
         values = self._sign * column_of("y", y)
         if self.outcome == "success":
             values = np.where(np.isnan(values), 0.0, values)  # a failed trial did not succeed
-        trials = Trials(self.box, self._trials.limits, self.outcome != "value")
+        trials = Trials(self.box, self._trials.limits, self.outcome != "value", self._fixed)
         trials.restore(
             X,
             values,

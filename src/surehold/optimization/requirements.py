@@ -31,7 +31,7 @@ from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.output_models import OutputModels
-from surehold.optimization.recommendation import OUTSIDE, Recommendation, execution_at
+from surehold.optimization.recommendation import Recommendation, execution_at
 from surehold.optimization.response_model import expected_places
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
@@ -202,7 +202,8 @@ class Requirements:
         """
         share = np.where(trials.eligible, self.feasibility(trials), -1.0)
         if not (trials.eligible & self._allowed_at(trials)).any():
-            raise InputError("no trial at an allowed input has given a value yet; ask for one, and tell its outcome.")
+            where = "an allowed input" if trials.kept.any() else "the values of fixed variables"
+            raise InputError(f"no trial at {where} has given a value yet; ask for one, and tell its outcome.")
         best = share >= share.max() - 1e-12
         if best.sum() > 1:  # all certainly infeasible: the one that misses least
             beyond = self._outputs.beyond(trials)
@@ -241,7 +242,7 @@ class Requirements:
         if not self._allowed_at(trials)[k]:
             return f"{start}is not allowed."
         if not trials.eligible[k]:
-            return start + OUTSIDE
+            return start + trials.why_no_answer(k)
         if (model := self._where_it_fails(trials)) is not None and not self._ranking.exact_inputs:
             share = float(
                 np.exp(Succeeds(model, self._ranking.accurate).log_probability(trials.places[k : k + 1])[0][0])

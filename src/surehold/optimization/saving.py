@@ -13,6 +13,7 @@ from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.linear import Linear
+from surehold.optimization.lattice import fixed_of
 from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.trials import Trials
@@ -110,7 +111,7 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
         # What is stored is in the sign in which it is maximized.
         same = settings.get("direction", "maximize") == data["settings"].get("direction", "maximize")
         sign = 1.0 if same else -1.0
-        trials = Trials(box, limits, settings.get("outcome", "value") != "value")
+        trials = Trials(box, limits, settings.get("outcome", "value") != "value", fixed_of(box, settings.get("fixed")))
         trials.restore_cube(
             [trial["commanded"] for trial in told],
             [np.nan if trial["value"] is None else sign * trial["value"] for trial in told],

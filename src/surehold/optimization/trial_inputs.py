@@ -10,7 +10,7 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.variables import Number
 
-__all__ = ["check_levels", "check_place", "initial_inputs", "trial_input", "trial_inputs"]
+__all__ = ["check_levels", "check_place", "check_tried", "initial_inputs", "trial_input", "trial_inputs"]
 
 # A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
 # it stay finite.
@@ -74,6 +74,17 @@ def check_place(box: Box, number: int, x: NDArray[np.float64], place: NDArray[np
         raise InputError(
             f"trial {number} at {shown} was forgotten, or belongs to another optimizer: here trial {number} is at "
             f"{box.as_dict(box.from_unit(place))}. Tell the optimizer that asked for it, or tell(x, y) by the place."
+        )
+
+
+def check_tried(box: Box, points: NDArray[np.float64], nearest: NDArray[np.float64]) -> None:
+    """Raise InputError where one of the points to be tried first (i, d) is none that can be tried; `nearest` are."""
+    moved = np.any(np.abs(points - nearest) > box.rounding / box.widths, axis=1)
+    if moved.any():
+        given, other = box.from_unit(points[moved][0]), box.from_unit(nearest[moved][0])
+        raise InputError(
+            f"initial_points hold {box.as_given(given)}, which is never tried: the nearest that can be is "
+            f"{box.as_dict(other)}. Give levels of variables in steps, and the values of fixed ones."
         )
 
 

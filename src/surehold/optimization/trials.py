@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.defaults import ROUNDED
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
+from surehold.optimization.lattice import Fixed
 from surehold.optimization.limits import Limit, checked_outputs
 from surehold.optimization.stored_trials import checked_columns
 from surehold.optimization.trial_inputs import check_levels, check_place, trial_input, trial_inputs
@@ -51,11 +52,12 @@ class Trials:
     """All trials of one optimizer, in the order in which they were told.
 
     `limits` are those of further outputs that every trial tells, watched ones included. `counted`: whether values are
-    shares of executions that succeeded, among which there are no outliers.
+    shares of executions that succeeded, among which there are no outliers. `fixed` are variables that an answer keeps.
     """
 
-    def __init__(self, box: Box, limits: tuple[Limit, ...] = (), counted: bool = False):
+    def __init__(self, box: Box, limits: tuple[Limit, ...] = (), counted: bool = False, fixed: Fixed | None = None):
         self._box = box
+        self._fixed: Final = fixed
         self.limits: Final = limits
         self._outputs: list[tuple[float, ...]] = []
         self._executions: list[int] = []
@@ -126,15 +128,29 @@ class Trials:
         return np.isfinite(self.values)
 
     @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Whether each trial was commanded at the values of fixed variables, (t,)."""
+        return np.ones(len(self), dtype=bool) if self._fixed is None else self._fixed.keeps(self.commanded)
+
+    @property
     def eligible(self) -> NDArray[np.bool_]:
         """Whether each trial gave a value at an input that can be commanded again, (t,).
 
         Those that reached a place outside of the box teach the model, but are no answer; where all of them did, the
-        nearest points of the box are: see `places`. Conditions that nobody sets may lie anywhere.
+        nearest points of the box are: see `places`. Conditions that nobody sets may lie anywhere. Those at other values
+        of fixed variables teach, and are no answer either.
         """
-        successful = self.successful
+        successful = self.successful & self.kept
         inside = successful & np.all((self.reached >= 0.0) & (self.reached <= 1.0) | ~self._set, axis=1)
         return inside if inside.any() else successful
+
+    def why_no_answer(self, k: int) -> str:
+        """Return why trial k, which gave a value, is none of the `eligible` ones; empty where it is one."""
+        if self.eligible[k]:
+            return ""
+        return (
+            "reached a place outside of the box." if self.kept[k] else "was made at another value of a fixed variable."
+        )
 
     @property
     def places(self) -> NDArray[np.float64]:

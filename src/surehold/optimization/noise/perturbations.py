@@ -134,14 +134,14 @@ class Perturbations:
     def _at(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
         """Return offsets, and the derivative of each perturbed coordinate by the query's (None: 1 everywhere)."""
         offsets = self.quadrature.offsets
+        free = None
         if self.root is not None and self.held is None:
             offsets = np.einsum("qde,se->qsd", self.root(U), offsets)
-        elif self.root is not None:  # noise that varies is that under the condition
-            places = np.where(self.held, offsets, U[:, None, :])
-            roots = self.root(places.reshape(-1, U.shape[1])).reshape(*places.shape, U.shape[1])
-            offsets = np.einsum("qsde,se->qsd", roots, np.where(self.held, 0.0, offsets))
-        free = None
         if self.held is not None:
+            if self.root is not None:  # noise that varies is that under the condition
+                places = np.where(self.held, offsets, U[:, None, :])
+                roots = self.root(places.reshape(-1, U.shape[1])).reshape(*places.shape, U.shape[1])
+                offsets = np.einsum("qsde,se->qsd", roots, np.where(self.held, 0.0, offsets))
             offsets = np.where(self.held, self.quadrature.offsets - U[:, None, :], offsets)
             free = np.broadcast_to(np.where(self.held, 0.0, 1.0), offsets.shape)
         if self.border == "extend":
