@@ -106,3 +106,41 @@ def test_what_is_refused(vocs, message):
 def test_the_direction_has_one_owner():
     with pytest.raises(InputError, match="those of its vocs"):
         RobustGenerator(gm_vocs(), direction="minimize")
+
+
+LIMITED = {"constraints": {"g": ["LESS_THAN", 0.5]}}
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({"_id": 1, "f": 0.5}, "lacks g"),
+        ({"_id": 1, "f": "bad", "g": 0.1}, "f is 'bad'; give one number"),
+        ({"_id": 1, "f": 0.5, "g": "bad"}, "g is 'bad'; give one number"),
+        ({"_id": 0, "f": 0.5, "g": 0.1}, "hold an _id twice"),
+        ({"x": 0.2, "f": 0.5, "g": 0.1}, "lacks mode"),
+        ({"x": 1.2, "mode": 1, "f": 0.5, "g": 0.1}, "outside"),
+        ({"x": 0.2, "mode": 7, "f": 0.5, "g": 0.1}, "choice for 'mode' '7' is unknown"),
+    ],
+)
+def test_of_points_with_a_bad_one_none_is_taken(bad, message):
+    vocs = VOCS(variables={"x": [0.0, 1.0], "mode": {1, 2}}, objectives={"f": "MINIMIZE"}, **LIMITED)
+    generator = RobustGenerator(vocs)
+    first, second = (point | {"f": 0.3, "g": 0.1} for point in generator.suggest(2))
+    with pytest.raises(InputError, match=message):
+        generator.ingest([first, bad])
+    assert len(generator.optimizer.y) == 0
+    generator.ingest([first, second])
+    assert generator.optimizer.y.tolist() == [0.3, 0.3]
+
+
+def test_whole_numbers_may_come_back_as_floats():
+    generator = RobustGenerator(VOCS(variables={"n": {1, 2, 4}}, objectives={"f": "MINIMIZE"}))
+    generator.ingest([{"n": 2.0, "f": 0.3}, {"n": np.int64(4), "f": 0.1}])
+    assert generator.recommend().parameters == {"n": 4}
+
+
+@pytest.mark.parametrize("settings", [{"outcome": "success"}, {"outcome": "preference"}, {"noise": "told"}], ids=str)
+def test_points_tell_a_value_alone(settings):
+    with pytest.raises(InputError, match=r"take a surehold\.Optimizer"):
+        RobustGenerator(gm_vocs(), **settings)
