@@ -74,6 +74,8 @@ def test_dividing_the_bins_keeps_every_trial_where_it_was():
         (lambda: RandomEmbedding(sh.Box.unit(3), 2, constraints={"a": (0.0, 1.0)}), "knows no constraints"),
         (lambda: NestedEmbedding(sh.Box.unit(3), 9, direction="minimize"), "knows no direction"),
         (lambda: RandomEmbedding(sh.Box({"n": (0, 9, "int"), "m": (0, 9, "int")}), 1), "of plain intervals"),
+        (lambda: RandomEmbedding(sh.Box({"x": (0, 1)}, uncontrolled={"load": [1.0, 2.0]}), 1), "nobody sets"),
+        (lambda: NestedEmbedding(sh.Box.unit(3), 9, noise="told"), "tell no noise"),
         (lambda: RandomEmbedding(sh.Box.unit(3), 2, seed=-1), "seed is -1"),
         (lambda: RandomEmbedding(sh.Box.unit(3), 2).best(), "no trial has given a value"),
         (lambda: RandomEmbedding(sh.Box.unit(3), 2).tell(np.zeros(3), 1.0), "was not asked for"),

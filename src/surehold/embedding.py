@@ -190,6 +190,8 @@ def _check(box: Box, dimension: int, seed: int, settings: dict[str, Any]) -> Non
         raise InputError(f"box is {box!r}; give a surehold.Box of named bounds.")
     if not box.plain:
         raise InputError(f"{box!r} has logarithms, whole numbers or choices; an embedding is of plain intervals.")
+    if box.uncontrolled is not None:
+        raise InputError(f"{box!r} has variables that nobody sets, but an embedding sets all; leave them out.")
     if isinstance(dimension, bool) or not isinstance(dimension, int) or not 1 <= dimension <= box.dimension:
         raise InputError(f"dimension is {dimension!r}; give 1 to {box.dimension}, the number of variables.")
     whole_number("seed", seed, 0)
@@ -199,6 +201,8 @@ def _check(box: Box, dimension: int, seed: int, settings: dict[str, Any]) -> Non
     for name in ("direction", "constraints", "conditions", "outcome"):
         if settings.get(name) is not None:
             raise InputError(f"an embedding maximizes one value and knows no {name}; leave it out.")
+    if settings.get("noise") == "told":
+        raise InputError("trials of an embedding tell no noise; give noise='inferred', or its standard deviation.")
 
 
 def _positive(count: int) -> int:

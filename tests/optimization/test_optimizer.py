@@ -437,3 +437,17 @@ def test_the_thesis_preset_gives_up_a_point_that_it_proposes_again_and_again():
     places, times = np.unique(np.round(optimizer.X, 6), axis=0, return_counts=True)
     assert times.max() == 3, "once and twice again; without a limit it would be told nothing new to the end"
     assert places[times.argmax()] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("X", "message"),
+    [([[0.1, np.nan]], r"X holds \[0.1, nan\]"), (np.zeros((2, 3, 2)), r"shape \(2, 3, 2\); give one row a point")],
+)
+def test_the_model_is_asked_at_finite_points(X, message):
+    optimizer = Optimizer(Box({"a": (0.0, 1.0), "b": (0.0, 2.0)}), seed=0)
+    optimizer.tell([0.1, 0.2], 1.0)
+    for ask in (optimizer.predict, optimizer.risk_measure):
+        with pytest.raises(InputError, match=message):
+            ask(X)
+    assert optimizer.predict([0.1, 0.2])[0] == pytest.approx([1.0])
+    assert optimizer.predict(np.empty((0, 2)))[0].shape == (0,)

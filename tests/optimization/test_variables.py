@@ -131,6 +131,7 @@ def test_such_a_box_hands_out_trials_by_name_only():
         ((0.0, 1.0, "step=2"), "wider than its range"),
         ((0, 3, "int", "step=4"), "wider than its range"),
         ((0.0, 1.0, "step=-1"), "step"),
+        ((0.0, 1.0, "step=nan"), "step"),
         ((0.1, 1.0, "log", "step=0.1"), "logarithmic and has steps"),
         ((0.0, 1.0, "lin"), "'log', 'int'"),
         ((0.0, 1.0, 2.0), "'log', 'int'"),

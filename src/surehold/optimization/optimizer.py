@@ -32,6 +32,7 @@ from surehold.optimization.success import described
 from surehold.optimization.surrogates.gaussian_process.observations import NoiseName
 from surehold.optimization.surrogates.protocol import Posterior, Surrogate, mixture
 from surehold.optimization.surrogates.success.preference import PreferencePosterior
+from surehold.optimization.trial_inputs import query_points
 from surehold.optimization.trials import AskedTrial, Trials
 
 if TYPE_CHECKING:
@@ -369,8 +370,10 @@ class Optimizer(Record):
 
         With `under_noise`, of the outcome averaged over the input noise instead, by the perturbations that the search
         uses: the deviation is the model's, and says nothing of how exact that average is (`recommend` takes more).
+
+        Raises InputError if no trial has given a value yet, or X are no finite points.
         """
-        U = np.atleast_2d(self.box.to_unit(X))
+        U = query_points(self.box, X)
         perturbations = self._ranking.accurate if under_noise else Perturbations(exact(self.box.dimension))
         with computing():
             mean, variance = mixture(perturbations.outcome(self.posterior, U))
@@ -379,9 +382,9 @@ class Optimizer(Record):
     def risk_measure(self, X: ArrayLike) -> NDArray[np.float64]:
         """Return what X (q, d), in the box's units, is expected to be worth by the `risk` that was asked for, (q,).
 
-        Under the input noise; by default its mean, as of `predict`. Raises InputError if no trial has given a value.
+        Under the input noise; by default its mean, as of `predict`, and raises InputError as that does.
         """
-        U = np.atleast_2d(self.box.to_unit(X))
+        U = query_points(self.box, X)
         with computing():
             return self._sign * self._ranking.worth(self.posterior, U)
 

@@ -10,7 +10,15 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.variables import Number
 
-__all__ = ["check_levels", "check_place", "check_tried", "initial_inputs", "trial_input", "trial_inputs"]
+__all__ = [
+    "check_levels",
+    "check_place",
+    "check_tried",
+    "initial_inputs",
+    "query_points",
+    "trial_input",
+    "trial_inputs",
+]
 
 # A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
 # it stay finite.
@@ -43,6 +51,17 @@ def trial_input(box: Box, name: str, x: Any) -> NDArray[np.float64]:
     if not np.all(np.isfinite(points)):
         raise InputError(f"{name} is {points.tolist()}; every coordinate must be a finite number.")
     return u
+
+
+def query_points(box: Box, X: Any) -> NDArray[np.float64]:
+    """Return finite points X (q, d), or one (d,), inside of the box or not, the unit cube being the box: (q, d)."""
+    U = np.atleast_2d(box.to_unit(X))
+    if U.ndim != 2:
+        raise InputError(f"X has shape {U.shape}; give one row a point, (q, {box.dimension}).")
+    if not np.all(np.isfinite(U)):
+        bad = np.atleast_2d(box.points(X))[int(np.argmin(np.isfinite(U).all(axis=1)))]
+        raise InputError(f"X holds {bad.tolist()}; every coordinate must be a finite number.")
+    return U
 
 
 def check_levels(box: Box, name: str, x: Any) -> None:

@@ -203,7 +203,7 @@ def _number(name: str, lower: float, upper: float, words: list[str]) -> Number:
             options[option] = float(value) if option == "step" else value == ""
         except ValueError:
             options[option] = False
-        if option not in ("log", "int", "step") or not options[option] or options[option] < 0.0:
+        if option not in ("log", "int", "step") or not options[option] > 0.0:
             raise InputError(f"variable '{name}' is {word!r}; {_FORM}.")
     integer, log, step = "int" in options, "log" in options, options.get("step", 0.0)
     if log and lower <= 0.0:
