@@ -259,3 +259,26 @@ def test_the_last_level_is_one_that_the_steps_reach():
     found = [box.as_dict(box.from_unit([u, u])) for u in np.linspace(0.0, 1.0, 101)]
     assert {row["n"] for row in found} == {0, 3, 6, 9}
     assert sorted({round(row["x"], 9) for row in found}) == [0.0, 0.3, 0.6, 0.9]
+
+
+def test_correlated_noise_beside_a_choice():
+    rng = np.random.default_rng(0)
+    box = Box({"x": (-1.0, 3.0), "g": ["p", "q"], "n": (0, 9, "int"), "f": (0.1, 10.0, "log")})
+    root = np.array([[0.1, 0.0, 0.0], [0.2, 0.3, 0.0], [0.0, -0.05, 0.1]])
+    stated = InputNoise(covariance=root @ root.T)  # of x, n and the logarithm of f
+    noise = Optimizer(box, input_noise=stated).input_noise
+    own, widths = [0, 3, 4], box.widths[[0, 3, 4]]
+    covariance = noise.unit_covariance(box)
+    assert covariance[np.ix_(own, own)] * np.outer(widths, widths) == pytest.approx(root @ root.T)
+    assert not covariance[1:3].any()
+    optimizer = Optimizer(box, seed=0)
+    for _ in range(40):
+        asked = optimizer.ask_trial()
+        x, n, log_f = asked.x[own] + root @ rng.standard_normal(3)
+        reached = {"x": x, "g": asked.parameters["g"], "n": n, "f": float(np.exp(log_f))}
+        optimizer.tell(asked, 0.0, reached=reached)
+    again = Optimizer(box, input_noise=optimizer.estimate_input_noise()).input_noise
+    correlations = np.corrcoef(root @ rng.standard_normal((3, 4000)))
+    found = again.unit_covariance(box)[np.ix_(own, own)]
+    deviations = np.sqrt(np.diag(found))
+    assert found / np.outer(deviations, deviations) == pytest.approx(correlations, abs=0.3)

@@ -46,8 +46,7 @@ class Sampler(BaseSampler):
         do; the first trial is then drawn at random. Parameters that are not among them are drawn at random.
     input_noise
         How far the reached input strays from the commanded one, in the parameters' units; of a log parameter the
-        standard deviation of its natural logarithm. Integers are rounded after they have strayed. Choices carry none,
-        and correlated noise cannot stand beside them.
+        standard deviation of its natural logarithm. Integers are rounded after they have strayed. Choices carry none.
     seed
         Non-negative integer.
     surrogate

@@ -245,8 +245,7 @@ def noise_of_coordinates(noise: InputNoise | None, box: Box) -> InputNoise | Non
     Raises
     ------
     InputError
-        If it is no input noise, its names are not those of the numbers, or choices meet noise that is correlated or
-        varies.
+        If it is no input noise, its names are not those of the numbers, or choices meet noise that varies.
     """
     numbers = box.numbers
     noise = checked_input_noise(noise, () if numbers is None else numbers.names)
@@ -256,13 +255,16 @@ def noise_of_coordinates(noise: InputNoise | None, box: Box) -> InputNoise | Non
         raise InputError("input noise is given, but all variables are choices, which carry none; leave it out.")
     if noise.varies:
         raise InputError("input noise varies from place to place, and some variables are choices; give constants.")
+    own = [box.names.index(name) for name in numbers.names]
     if isinstance(noise.kind, Samples):
         errors = np.zeros((len(noise.kind.errors), box.dimension))
-        errors[:, [box.names.index(name) for name in numbers.names]] = noise.kind.errors
+        errors[:, own] = noise.kind.errors
         return InputNoise.samples(errors)
     covariance = noise.unit_covariance(numbers)
-    if np.any(covariance != np.diag(np.diag(covariance))):
-        raise InputError("input noise is correlated, and some variables are choices; give standard deviations.")
+    if isinstance(noise.kind, Correlated):
+        matrix = np.zeros((box.dimension, box.dimension))
+        matrix[np.ix_(own, own)] = noise.kind.covariance
+        return InputNoise(covariance=matrix)
     deviations = dict.fromkeys(box.names, 0.0)
     deviations |= dict(zip(numbers.names, (np.sqrt(np.diag(covariance)) * numbers.widths).tolist(), strict=True))
     if noise.bounded:
