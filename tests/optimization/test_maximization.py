@@ -367,6 +367,19 @@ def test_bad_settings(settings, words):
         Optimizer(BOX, **settings)
 
 
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"noise": "told"}, "a function tells no noise"),
+        ({"conditions": "measured"}, "a function is called at the conditions"),
+    ],
+)
+def test_what_a_function_cannot_tell_is_refused_before_it_is_called(settings, words):
+    box = Box({"x": (0.0, 1.0)}, uncontrolled={"load": [0.2, 0.4]})
+    with pytest.raises(InputError, match=words):
+        maximize(pytest.fail, box, n_trials=9, **settings)
+
+
 @pytest.mark.parametrize("run", [maximize, minimize])
 @pytest.mark.parametrize(
     ("settings", "words"),

@@ -298,6 +298,16 @@ def _count(name: str, value: int) -> int:
 def _optimizer(box: Box, n_trials: int, settings: dict[str, Any]) -> Optimizer:
     if settings.get("outcome") == "preference":
         raise InputError("a function gives no preferences; make an Optimizer, and tell_preference(better, worse).")
+    if settings.get("noise") == "told":
+        raise InputError(
+            "a function tells no noise with its value; give noise='inferred' or its deviation, or make an Optimizer, "
+            "and tell(x, y, noise=...)."
+        )
+    if settings.get("conditions") == "measured" and getattr(box, "uncontrolled", None) is not None:
+        raise InputError(
+            "a function is called at the conditions that are asked for, and tells none; leave conditions out, or make "
+            "an Optimizer, and tell(x, y, reached=...)."
+        )
     named = [name for function in (Optimizer, maximize) for name in signature(function).parameters]
     known = [name for name in named if name not in ("f", "box", "settings")]
     for name in settings:
