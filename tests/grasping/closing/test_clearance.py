@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from exact_mesh import ExactMesh, capsule_pair
+from scipy.spatial.transform import Rotation
 
 from surehold.grasping.closing.clearance import (
     box_gap,
@@ -73,6 +74,27 @@ def test_palm_gap_equals_the_exact_mesh_distance(scene):
             assert gap == pytest.approx(exact.box(pose, half, rounding), abs=6e-5)
         elif gap >= 0.010:
             assert exact.box(pose, half, rounding) > 0.0099
+
+
+def test_an_object_wholly_inside_the_palm_is_a_collision():
+    """No face of the box comes near it: the sphere's center tells, in closed form."""
+    radius, half, rng = 0.004, np.array([0.040, 0.0335, 0.015]), np.random.default_rng(6)
+    axis = 0.001 * np.arange(-20, 21)
+    places = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    away = np.linalg.norm(places, axis=-1, keepdims=True)
+    nodes = np.concatenate([away - radius, places / np.where(away > 0.0, away, 1.0)], axis=-1).astype(np.float32)
+    frame = np.concatenate([np.full(3, axis[0]), [0.001], np.full(3, -radius), np.full(3, radius)])
+    inside = 0
+    for _ in range(200):
+        turn = Rotation.random(rng=rng).as_matrix()
+        center = rng.uniform(-1.2, 1.2, 3) * half
+        pose = np.column_stack([turn, -turn @ center])  # of the box, with the sphere at `center` in its axes
+        gap = palm_gap(nodes, frame, pose, half, 0.003, 1e-5, 0.005)
+        over = np.maximum(np.abs(center) - (half - 0.003), 0.0)
+        exact = np.linalg.norm(over) - 0.003 - radius
+        inside += bool(np.all(over == 0.0))
+        assert (gap < 0.0) == (exact < 0.0)
+    assert inside > 50
 
 
 def test_pair_gap_equals_an_independent_library():

@@ -165,7 +165,8 @@ def box_gap(pose, half, rounding, near, far, radius):
 def palm_gap(nodes, frame, pose, half, rounding, tolerance, enough):
     """Return the gap between the palm's box at `pose` (3, 4) and the object [m], to `tolerance`.
 
-    Gaps above `enough` are reported as at least `enough`. The faces of the box without its rounding are searched.
+    Gaps above `enough` are reported as at least `enough`. The faces of the box without its rounding are searched; where
+    the object meets none of them, the inside, which may hold all of it: the gap is then minus its way to a face.
     """
     best = np.inf
     rectangles = np.empty((256, 4))
@@ -218,4 +219,35 @@ def palm_gap(nodes, frame, pose, half, rounding, tolerance, enough):
                     rectangles[n, 0], rectangles[n, 1] = cu, cv + s * hv
                     rectangles[n, 2], rectangles[n, 3] = hu, 0.5 * hv
                     n += 1
+    if best > rounding and _holds(nodes, frame, pose, half - rounding - best):
+        return -best
     return best - rounding
+
+
+@njit(cache=True)
+def _holds(nodes, frame, pose, half):
+    """Tell whether a point of the object lies in the box of half extents `half`, which it does not reach into."""
+    if half.min() <= 0.0:
+        return False
+    blocks = np.zeros((256, 6))  # centers and half extents, in the axes of the box
+    blocks[0, 3:] = half
+    n = 1
+    while n > 0:
+        n -= 1
+        center, size = blocks[n, :3].copy(), blocks[n, 3:].copy()
+        x = pose[0, 3] + pose[0, 0] * center[0] + pose[0, 1] * center[1] + pose[0, 2] * center[2]
+        y = pose[1, 3] + pose[1, 0] * center[0] + pose[1, 1] * center[1] + pose[1, 2] * center[2]
+        z = pose[2, 3] + pose[2, 0] * center[0] + pose[2, 1] * center[1] + pose[2, 2] * center[2]
+        f = field_distance(nodes, frame, x, y, z)
+        if f < 0.0:
+            return True
+        reach = np.sqrt(size[0] ** 2 + size[1] ** 2 + size[2] ** 2)
+        if f >= reach or reach < 0.5 * frame[3]:  # the field knows nothing that is smaller than a cell
+            continue
+        longest = int(np.argmax(size))
+        for s in (-0.5, 0.5):
+            blocks[n, :3], blocks[n, 3:] = center, size
+            blocks[n, longest] += s * size[longest]
+            blocks[n, 3 + longest] *= 0.5
+            n += 1
+    return False
