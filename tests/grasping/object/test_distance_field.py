@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
-from surehold.grasping.object.distance_field import MARGIN, cache_folder, distance_field_of
+from surehold.grasping.object.distance_field import MARGIN, DistanceField, cache_folder, distance_field_of
 from surehold.grasping.object.mesh_distance import FAR_INSIDE, FAR_OUTSIDE
 from surehold.grasping.object.mesh_files import load_mesh
 from surehold.grasping.object.shipped import OBJECTS, shipped_object
@@ -38,6 +38,20 @@ def test_beyond_the_grid_the_field_is_a_lower_bound(name):
     distance = field.distance(points)
     assert np.all(distance <= signed_distance(obj.solids, points)[0] + 1e-6)
     assert np.all(distance > MARGIN)
+
+
+def test_a_field_of_its_own_is_continued_to_the_margin():
+    """Where its grid ended near the object, fingers met the object's box in place of the object."""
+    obj, cut = shipped_object("mug"), 7
+    whole = distance_field_of(obj, cell=0.002)
+    short = DistanceField(whole.nodes[cut:-cut, cut:-cut, cut:-cut], whole.frame.copy())
+    short.frame[:3] += cut * 0.002
+    field = distance_field_of(dataclasses.replace(obj, distances=short), margin=0.02)
+    points = obj.box_center + np.random.default_rng(1).uniform(-1.0, 1.0, (6_000, 3)) * (obj.box_half_extents + 0.019)
+    error = field.distance(points) - signed_distance(obj.solids, points)[0]
+    assert np.percentile(np.abs(error), 99) < 5e-4
+    assert np.abs(error).max() < 0.002, "a cell"
+    assert distance_field_of(dataclasses.replace(obj, distances=field), margin=0.02) is field
 
 
 def test_field_is_cached_and_a_damaged_file_is_replaced(tmp_path, monkeypatch):

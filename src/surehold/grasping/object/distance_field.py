@@ -8,7 +8,9 @@
 Linear interpolation of the values overrates a curved field by h^2 f''/8, the linear continuations of the nodes
 underrate it by as much; their mean, used here, leaves an error of third order in the cell size h. The gradient is
 continuous. Where the field has a ridge (equally near to two surfaces) it is underrated by at most about h/4.
-Beyond the grid the distance to the object's box is returned: a lower bound, and never below the margin.
+Beyond the grid the distance to the object's box is returned: a lower bound, and never below the margin. A field that
+the object brings along and that reaches less far is continued: outside of its grid the distance is taken to the closest
+of the surface's points that belong to nodes on the grid's border, too large by a fraction of a cell at most.
 """
 
 import hashlib
@@ -80,7 +82,7 @@ def distance_field_of(
     A cache folder that cannot be written costs time at the next start and nothing else. The cell is `CELL` for the
     shipped objects, and for a mesh the larger of that and what keeps the grid to 2 million nodes (1 million from
     300,000 triangles on). `progress` is called with the share that is done while a field is computed. The grid reaches
-    `margin` [m] beyond the object, `MARGIN` or more: thick fingers need more.
+    `margin` [m] beyond the object, `MARGIN` or more: thick fingers need more. A field of its own is continued to there.
 
     Raises
     ------
@@ -88,7 +90,7 @@ def distance_field_of(
         If the cell is not a positive number, or the object is so large that the grid would not fit into memory.
     """
     if obj.distances is not None:
-        return obj.distances
+        return _continued(obj.distances, margin)
     lower, upper = obj.vertices.min(axis=0), obj.vertices.max(axis=0)
     if cell is None:
         cell = CELL if obj.solids else _mesh_cell(upper - lower + 2.0 * margin, len(obj.faces))
@@ -108,6 +110,35 @@ def distance_field_of(
         nodes = _compute(obj, frame, shape, progress)
         _store(path, nodes)
     return DistanceField(nodes, frame)
+
+
+def _continued(field: DistanceField, margin: float) -> DistanceField:
+    """Return a field whose grid reaches `margin` [m] beyond the object, or the same one if it does."""
+    from scipy.spatial import KDTree
+
+    nodes, first, cell = field.nodes, field.frame[:3], field.frame[3]
+    last = first + cell * (np.array(nodes.shape[:3]) - 1)
+    missing = margin - np.array([field.frame[4:7] - first, last - field.frame[7:]])
+    more = np.maximum(np.ceil(missing / cell - 1e-6), 0.0).astype(int)  # nodes before the first and behind the last
+    if not more.any():
+        return field
+    inner = tuple(slice(before, before + n) for before, n in zip(more[0], nodes.shape[:3], strict=True))
+    wide = np.zeros((*(more.sum(axis=0) + nodes.shape[:3]), 4), dtype=np.float32)
+    wide[inner] = nodes
+    known = np.zeros(wide.shape[:3], dtype=bool)
+    known[inner] = True
+    border = known.copy()
+    border[tuple(slice(cut.start + 1, cut.stop - 1) for cut in inner)] = False
+    origin = first - cell * more[0]
+    steepness = np.linalg.norm(wide[border][:, 1:], axis=1)
+    sound = steepness > 0.5  # between two surfaces there is no closest one
+    values = wide[border][sound].astype(np.float64)
+    closest = origin + cell * np.argwhere(border)[sound] - values[:, :1] * values[:, 1:] / steepness[sound, None]
+    places = origin + cell * np.argwhere(~known)
+    away = places - closest[KDTree(closest).query(places)[1]]
+    length = np.linalg.norm(away, axis=1)
+    wide[~known] = np.column_stack([length, away / np.where(length > 0.0, length, 1.0)[:, None]])
+    return DistanceField(wide, np.concatenate([origin, field.frame[3:]]))
 
 
 def _compute(
