@@ -97,3 +97,19 @@ def test_the_check_weighs_the_object_at_its_center_of_mass(jaws, box):
     checker = GraspChecker(simulator)
     verdicts = [checker.check(simulator.grasp(Pose((0.0, y, -0.05)))).verdict for y in (0.12, 0.0)]
     assert verdicts == ["held", "dropped"], "near the mass, and 140 mm away from it"
+
+
+@pytest.mark.parametrize("edge", [0.006, 0.012])
+@pytest.mark.parametrize("mass", [0.0002, 0.002, 0.02])
+def test_strong_fingers_do_not_sink_through_what_is_light(jaws, box, edge, mass):
+    """A hundred times its weight holds a cube, and its corners stay where they touch to a millimeter."""
+    mujoco = pytest.importorskip("mujoco")
+    simulator = Simulator(jaws, box(edge, edge, edge), friction=0.5)
+    checker = GraspChecker(simulator, mass=mass)
+    grasp = simulator.grasp(Pose((0.0, 0.002, -0.05)))
+    settled, data = checker._squeezed([grasp])[1][0], mujoco.MjData(checker.model)
+    mujoco.mj_setState(checker.model, data, settled, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    mujoco.mj_forward(checker.model, data)
+    assert data.ncon > 0
+    assert np.all(data.contact.dist > -0.001)
+    assert checker.check(grasp).verdict == "held"

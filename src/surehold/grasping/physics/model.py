@@ -35,6 +35,9 @@ _BENT, _SHIFT = 0.35, 0.01  # how far targets move on beyond the touch [rad, m];
 _SLOW = 0.03  # joints that turn with a smaller rate of closing hold their place [rad per unit of the closing parameter]
 _RESPONSE: Final = 0.01  # time in which a joint under position control follows its target [s]
 _CENTERED: Final = 1e-6  # centers of mass nearer than this are the same [m]
+# Contacts of MuJoCo give way by what the finger's force accelerates the object: of what is lighter than the force by this
+# they are made harder, or fingers sink through it [m/s^2].
+_PRESSED: Final = 1200.0
 _STIFF = 40.0  # stiffness of a joint that does not close, relative to its torque limit [1/rad]
 
 
@@ -42,6 +45,7 @@ class Drives(NamedTuple):
     """What moves the joints of a hand, all (f, j), and the object's mass."""
 
     mass: float  #: of the object [kg]
+    force: float  #: of a stretched finger at its tip [N]
     closing: Array  #: 1 or -1 where a joint closes, in that direction; 0 where it holds its place
     limits: Array  #: largest torque [N m], or force of joints that slide [N]
     stiffness: Array  #: of the position control [N m/rad, N/m]
@@ -62,7 +66,9 @@ def drives_of(simulator: Simulator, finger_force: float, mass: float) -> Drives:
     beyond = np.where(slides, _SHIFT, _BENT)
     levers = np.where(slides, 1.0, np.maximum(hand.reach().max(axis=2), 0.005))
     limits = finger_force * levers
-    return Drives(mass, closing, limits, np.where(closing != 0.0, 2.0 * limits / beyond, _STIFF * limits), beyond)
+    return Drives(
+        mass, finger_force, closing, limits, np.where(closing != 0.0, 2.0 * limits / beyond, _STIFF * limits), beyond
+    )
 
 
 def dynamics_model(simulator: Simulator, drives: Drives) -> Any:
@@ -83,7 +89,13 @@ def dynamics_model(simulator: Simulator, drives: Drives) -> Any:
     option.impratio = 10.0  # friction that does not creep
     friction = simulator.friction
     torsion = max(simulator.measure.torsion, soft_finger_torsion(friction, PATCH))
-    shared = {"condim": 4, "friction": (max(friction, 1e-5), torsion, 1e-5), "solref": (0.008, 1.0)}
+    gives = min(1.0, _PRESSED * drives.mass / drives.force)
+    shared = {
+        "condim": 4,
+        "friction": (max(friction, 1e-5), torsion, 1e-5),
+        "solref": (0.008, 1.0),
+        "solimp": (1.0 - 0.1 * gives, 1.0 - 0.05 * gives, 0.001, 0.5, 2.0),
+    }
     palm = spec.worldbody.add_body(name="palm")
     for k, (pose, half, rounding) in enumerate(
         zip(hand.palm_poses, hand.palm_half_extents, hand.palm_roundings, strict=True)
