@@ -73,6 +73,39 @@ def test_mass_box_and_center_of_a_turned_box(tmp_path):
     np.testing.assert_array_equal(load_mesh(tmp_path / "part.stl", "mm", frame="file").object.axes, np.eye(3))
 
 
+def l_shape():
+    """Return an L of 100 x 20 x 80 mm."""
+    outline = np.array([(0, 0), (100, 0), (100, 20), (20, 20), (20, 80), (0, 80)], dtype=float)
+    top = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)]
+    sides = [((i, (i + 1) % 6, (i + 1) % 6 + 6), (i, (i + 1) % 6 + 6, i + 6)) for i in range(6)]
+    faces = [*top, *[(c + 6, b + 6, a + 6) for a, b, c in top], *[(c, b, a) for pair in sides for a, b, c in pair]]
+    corners = np.vstack([np.column_stack([outline[:, 0], np.full(6, y), outline[:, 1]]) for y in (20.0, 0.0)])
+    return trimesh.Trimesh(corners, faces, process=False)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "edges"),
+    [
+        (trimesh.creation.box((40.0, 40.0, 40.0)), (40.0, 40.0, 40.0)),
+        (trimesh.creation.box((100.0, 100.0, 10.0)), (10.0, 100.0, 100.0)),
+        (trimesh.creation.cylinder(30.0, 20.0, sections=6), (20.0, 30.0 * np.sqrt(3.0), 60.0)),
+        (l_shape(), (20.0, 80.0, 100.0)),
+    ],
+    ids=["cube", "plate", "hexagon", "L"],
+)
+def test_the_box_of_a_part_is_the_same_however_its_file_turns_it(tmp_path, mesh, edges):
+    """Moments of inertia do not say where the faces of a cube or of an L are. Torques count by the longest edge."""
+    for seed in range(4):
+        turned = mesh.copy()
+        if seed:
+            turned.apply_transform(np.block([[Rotation.random(rng=seed).as_matrix(), np.zeros((3, 1))], [0, 0, 0, 1]]))
+        part = load_mesh(stored(tmp_path, turned), "mm").object
+        np.testing.assert_allclose(sorted(2e3 * part.box_half_extents), edges, rtol=0.01)
+        assert part.torque_length == pytest.approx(5e-4 * max(edges), rel=0.002)
+        np.testing.assert_allclose(part.axes.T @ part.axes, np.eye(3), atol=1e-12)
+        assert np.linalg.det(part.axes) == pytest.approx(1.0)
+
+
 def test_axes_of_a_body_of_revolution_are_those_of_the_file(tmp_path):
     mesh = trimesh.creation.cylinder(20.0, 100.0, sections=32)
     part = load_mesh(stored(tmp_path, mesh), "mm", frame="principal").object

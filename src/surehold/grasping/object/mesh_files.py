@@ -4,8 +4,10 @@ What is read and what is refused of a file is said in mesh_reading.py, what is m
 mesh_repair.py; the line of the diagnosis says what was done.
 
 Box. Its axes are the file's own or the principal axes of the volume, each named after the axis of the file that it is
-nearest to. Principal axes that belong to moments within 1 % of each other are arbitrary; of these, those that are
-nearest to the file's axes are taken. `auto` takes the file's own unless the principal axes give a smaller box.
+nearest to. Principal axes that belong to moments within 1 % of each other are arbitrary; of these, those nearest to the
+file's axes are taken, or those of the smallest box where that is smaller by 1 %. `auto` takes the file's own unless the
+principal axes give a box that is smaller by 1 %, or a box that lies on a flat side of the object is smaller by a tenth:
+most parts have the same box, and the same length by which torques are divided, however the file turns them.
 """
 
 from dataclasses import dataclass
@@ -27,6 +29,7 @@ Array = NDArray[np.float64]
 
 BOX_FRAMES: Final = ("auto", "file", "principal")
 DENSITY: Final = 1000.0  #: of an object whose mass is not given [kg/m^3]
+_FLAT: Final = 0.01  # of the area of a hull: what is smaller is no flat side of the object
 _Y_UP: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # columns: x, y, z of the box in glTF
 
 
@@ -104,7 +107,7 @@ def load_mesh(
     )
     size = " x ".join(f"{2e3 * half:.1f}" for half in obj.box_half_extents)
     weight = f"{1e3 * obj.mass:.3g} g" + ("" if mass is not None else f" at {DENSITY:g} kg/m^3")
-    turned = "" if np.array_equal(axes, own) else "; its box follows the principal axes"
+    turned = "" if np.array_equal(axes, own) else "; its box is turned from the file's axes"
     line = f"{file.name}: {len(faces):,} triangles, {size} mm, {weight}{turned}"
     return LoadedMesh(obj, "; ".join([line, *notes]))
 
@@ -124,31 +127,89 @@ def _box_axes(vertices: Array, own: Array, moments: Array, frame: str) -> Array:
     """Return the axes (3, 3) of the box as columns."""
     if frame == "file":
         return own
-    principal = _principal_axes(moments, own)
+    flat = _flat_sides(vertices)
+    principal = _principal_axes(vertices, moments, flat, own)
     if frame == "principal":
         return principal
-    size = [np.prod(np.ptp(vertices @ axes, axis=0)) for axes in (own, principal)]
-    return principal if size[1] < 0.99 * size[0] else own
+    chosen, size = own, _box_volume(vertices, own)
+    for axes, share in ((principal, 0.99), (_smallest_box(vertices, flat, own), 0.9)):
+        if _box_volume(vertices, axes) < share * size:
+            chosen, size = axes, _box_volume(vertices, axes)
+    return chosen
 
 
-def _principal_axes(moments: Array, own: Array) -> Array:
+def _box_volume(vertices: Array, axes: Array) -> float:
+    return float(np.prod(np.ptp(vertices @ axes, axis=0)))
+
+
+def _principal_axes(vertices: Array, moments: Array, flat: Array, own: Array) -> Array:
     """Return the principal axes (3, 3) as columns, each the one nearest to an axis of `own`, right-handed."""
     values, vectors = np.linalg.eigh(own.T @ moments @ own)
-    best, turn, chosen = -np.inf, np.eye(3), values
+    order, turn = _named(vectors)
+    chosen, close = values[order], 0.01 * float(values.max())
+    same = np.abs(chosen - np.roll(chosen, -1)) < close  # of 0 and 1, 1 and 2, 2 and 0
+    if not np.any(same):
+        return own @ turn
+    if np.sum(same) > 1:
+        nearest, normals = np.eye(3), flat @ own
+    else:
+        # Turn the pair about its normal to where it lies nearest to the file's axes.
+        i = int(np.argmax(same))
+        j, k = (i + 1) % 3, (i + 2) % 3
+        angle = np.arctan2(turn[j, i] - turn[i, j], turn[i, i] + turn[j, j])
+        c, s = np.cos(-angle), np.sin(-angle)
+        nearest, normals = turn.copy(), turn[:, k][None]
+        nearest[:, i], nearest[:, j] = c * turn[:, i] + s * turn[:, j], c * turn[:, j] - s * turn[:, i]
+    smallest, nearest = _smallest_box(vertices, normals @ own.T, own), own @ nearest
+    return smallest if _box_volume(vertices, smallest) < 0.99 * _box_volume(vertices, nearest) else nearest
+
+
+def _named(axes: Array) -> tuple[list[int], Array]:
+    """Return in which order axes (3, 3), as columns, come nearest to x, y and z, and themselves so, right-handed."""
+    best, found, chosen = -np.inf, [0, 1, 2], axes
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
-            axes = vectors[:, order] * np.array(signs)
-            if np.linalg.det(axes) > 0.0 and np.trace(axes) > best + 1e-9:
-                best, turn, chosen = float(np.trace(axes)), axes, values[list(order)]
-    close = 0.01 * float(values.max())
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        if abs(chosen[i] - chosen[j]) < close:
-            if abs(chosen[j] - chosen[k]) < close or abs(chosen[k] - chosen[i]) < close:
-                return own
-            # Turn the pair about its normal to where it lies nearest to the file's axes.
-            angle = np.arctan2(turn[j, i] - turn[i, j], turn[i, i] + turn[j, j])
-            c, s = np.cos(-angle), np.sin(-angle)
-            first, second = turn[:, i].copy(), turn[:, j].copy()
-            turn[:, i], turn[:, j] = c * first + s * second, c * second - s * first
-            break
-    return own @ turn
+            turned = axes[:, order] * np.array(signs)
+            if np.linalg.det(turned) > 0.0 and np.trace(turned) > best + 1e-9:
+                best, found, chosen = float(np.trace(turned)), list(order), turned
+    return found, chosen
+
+
+def _flat_sides(vertices: Array) -> Array:
+    """Return the normals (n, 3) of the flat sides of the hull of vertices (v, 3), each a share `_FLAT` or more."""
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(vertices)
+    corners = vertices[hull.simplices]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    sides = hull.equations[np.argsort(-areas, kind="stable"), :3]  # of a side in several parts the largest comes first
+    _, first, side = np.unique(np.round(sides, 4), axis=0, return_index=True, return_inverse=True)
+    return sides[first[np.bincount(side.ravel(), np.sort(areas)[::-1]) > _FLAT * areas.sum()]]
+
+
+def _smallest_box(vertices: Array, normals: Array, own: Array) -> Array:
+    """Return the axes (3, 3) of the smallest box of vertices (v, 3) with a face along a normal (n, 3), named as `own`.
+
+    An edge of the smallest rectangle around points of a plane lies on an edge of their hull (Freeman and Shapira 1975).
+    """
+    from scipy.spatial import ConvexHull
+
+    if not len(normals):
+        return own
+    corners = vertices[ConvexHull(vertices).vertices]
+    best, axes = np.inf, np.eye(3)
+    for normal in normals:
+        across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+        across /= np.linalg.norm(across)
+        frame = np.column_stack([across, np.cross(normal, across), normal])
+        outline = corners @ frame[:, :2]
+        outline = outline[ConvexHull(outline).vertices]
+        edges = np.roll(outline, -1, axis=0) - outline
+        edges /= np.linalg.norm(edges, axis=1)[:, None]
+        width = np.ptp(outline @ edges.T, axis=0) * np.ptp(outline @ np.array([-edges[:, 1], edges[:, 0]]), axis=0)
+        least = int(np.argmin(width))
+        volume = float(width[least] * np.ptp(corners @ normal))
+        if volume < (1.0 - 1e-9) * best:
+            (c, s), best = edges[least], volume
+            axes = frame @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return own @ _named(own.T @ axes)[1]

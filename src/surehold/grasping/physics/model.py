@@ -35,8 +35,8 @@ _BENT, _SHIFT = 0.35, 0.01  # how far targets move on beyond the touch [rad, m];
 _SLOW = 0.03  # joints that turn with a smaller rate of closing hold their place [rad per unit of the closing parameter]
 _RESPONSE: Final = 0.01  # time in which a joint under position control follows its target [s]
 _CENTERED: Final = 1e-6  # centers of mass nearer than this are the same [m]
-# Contacts of MuJoCo give way by what the finger's force accelerates the object: of what is lighter than the force by this
-# they are made harder, or fingers sink through it [m/s^2].
+# Contacts of MuJoCo give way by as much as the finger's force accelerates the object: where that is more than this they
+# are made harder, or fingers sink through what is light [m/s^2].
 _PRESSED: Final = 1200.0
 _STIFF = 40.0  # stiffness of a joint that does not close, relative to its torque limit [1/rad]
 
