@@ -154,6 +154,19 @@ def test_normals_that_disagree_are_refused(tmp_path):
     refused(stored(tmp_path, mixed, "mixed.ply"), "disagree about what is outside")
 
 
+def test_single_triangles_that_are_inside_out_are_turned(tmp_path):
+    mesh = box().subdivide().subdivide().subdivide()
+    faces = mesh.faces.copy()
+    faces[[5, 6, 400]] = faces[[5, 6, 400], ::-1]
+    loaded = load_mesh(stored(tmp_path, trimesh.Trimesh(mesh.vertices, faces, process=False), "few.ply"), "mm")
+    assert "3 triangles were inside out among others and turned" in loaded.diagnosis
+    part = loaded.object
+    assert part.mass == pytest.approx(0.072, rel=1e-6)
+    np.testing.assert_allclose(part.center_of_mass, 0.0, atol=1e-9)
+    assert trimesh.Trimesh(part.vertices, part.faces, process=False).is_winding_consistent
+    assert len(convex_pieces(part.vertices, part.faces)) == 1, "the check by physics takes it"
+
+
 def test_degenerate_and_flat(tmp_path):
     refused(
         stored(tmp_path, trimesh.Trimesh([[0, 0, 0], [10, 0, 0], [0, 10, 0]], [[0, 1, 2]], process=False), "one.ply"),

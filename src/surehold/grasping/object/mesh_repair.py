@@ -4,9 +4,10 @@ A mesh is refused if it is not a solid of a size that a hand can meet: without t
 than `MOST_OPEN` of its area, with faces that disagree about what is outside, flat, below 5 mm or above 2 m.
 
 Mended, each with a note: vertices at the same place become one; triangles without area, and triangles given twice, are
-left out; holes are closed by a fan about the middle of their border; of the closed bodies that the mesh consists of,
-those that are inside out are turned; bodies that touch or overlap become their union (manifold3d), so that no space
-counts twice. A body that is inside out within another one is a cavity and stays one.
+left out; single triangles that are inside out among others are turned; holes are closed by a fan about the middle of
+their border; of the closed bodies that the mesh consists of, those that are inside out are turned; bodies that touch or
+overlap become their union (manifold3d), so that no space counts twice. A body that is inside out within another one is
+a cavity and stays one.
 """
 
 from typing import Any, Final, NamedTuple
@@ -84,6 +85,11 @@ def repaired(name: str, vertices: Array, faces: Faces, unit: str) -> tuple[Array
             f"{name!r} ({shown}) has {holes.twisted_edges:,} edges whose two faces disagree about what is outside; "
             "make the normals consistent in your modeling program."
         )
+    if holes.twisted_edges:
+        faces, turned = _consistent(faces)
+        if turned:
+            notes.append(f"{turned:,} triangle{'s were' if turned > 1 else ' was'} inside out among others and turned")
+        holes = _holes(vertices, faces)
     share, count = float(holes.areas.sum() / area.sum()), len(holes.areas)
     many = f"{count:,} hole{'s' * (count > 1)}"
     if share > MOST_OPEN:
@@ -108,6 +114,32 @@ def _single(faces: Faces) -> Faces:
     if len(alone):
         return alone
     return once[np.unique(where.ravel(), return_index=True)[1]]
+
+
+def _consistent(faces: Faces) -> tuple[Faces, int]:
+    """Return the faces, of those that hang together over edges of two the minority turned, and how many were turned.
+
+    Each face stands in a graph as it is and turned over; two faces of an edge hang together where they run along it in
+    opposite directions. A part falls into two then: how it is, and turned over as a whole.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    m = len(faces)
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    key = edges.min(axis=1) * (int(faces.max()) + 1) + edges.max(axis=1)
+    order = np.argsort(key, kind="stable")
+    start = np.flatnonzero(np.r_[True, np.diff(key[order]) > 0])
+    pairs = start[np.diff(np.r_[start, len(key)]) == 2]
+    one, other = order[pairs], order[pairs + 1]
+    twisted = edges[one, 0] == edges[other, 0]
+    a, b = one // 3, other // 3 + m * twisted
+    rows, columns = np.r_[a, a + m], np.r_[b, np.where(twisted, b - m, b + m)]
+    label = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * m, 2 * m)), False)[1]
+    kept = np.bincount(label[:m], minlength=label.max() + 1)
+    same, over = label[:m], label[m:]
+    turned = (kept[same] < kept[over]) | ((kept[same] == kept[over]) & (same > over))
+    return np.where(turned[:, None], faces[:, ::-1], faces), int(np.sum(turned))
 
 
 def _holes(vertices: Array, faces: Faces) -> _Holes:

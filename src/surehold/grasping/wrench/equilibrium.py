@@ -50,7 +50,7 @@ def min_weight(wrenches: ArrayLike) -> float:
     found = linprog(
         np.append(np.zeros(m), -1.0), A_eq=total, b_eq=np.append(np.zeros(6), 1.0), bounds=(0.0, None), method="highs"
     )
-    return min(max(m * float(found.x[-1]), 0.0), 1.0) if found.x is not None else 0.0
+    return min(max(0.0, m * float(found.x[-1])), 1.0) if found.x is not None else 0.0
 
 
 def load_residual(wrenches: ArrayLike, per_contact: int, load: ArrayLike) -> float:

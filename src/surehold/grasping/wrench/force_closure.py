@@ -86,7 +86,7 @@ def task_quality(wrenches: ArrayLike, task: ArrayLike) -> float:
                 break
         if found.x is None:
             raise ArithmeticError(f"the linear program of the task wrench {t} failed: {found.message}")
-        scale = min(scale, float(found.x[-1]) / size)
+        scale = min(scale, max(0.0, float(found.x[-1])) / size)
     return scale
 
 
