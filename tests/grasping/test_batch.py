@@ -61,6 +61,12 @@ def test_empty_and_bad_input():
     simulator = Simulator(obj="bottle")
     assert len(grasp_batch(simulator, [])) == 0
     poses, _ = random_poses(simulator, 3, 3)
+    with pytest.raises(InputError, match="one pose is given"):
+        grasp_batch(simulator, poses[0])
+    with pytest.raises(InputError, match=r"shape \(4,\); give poses, or matrices \(n, 3, 4\)"):
+        grasp_batch(simulator, poses[0].matrix)
+    four = np.stack([np.vstack([pose.matrix, [0.0, 0.0, 0.0, 1.0]]) for pose in poses])
+    np.testing.assert_array_equal(grasp_batch(simulator, four).quality, grasp_batch(simulator, poses).quality)
     with pytest.raises(InputError, match="workers are 0"):
         grasp_batch(simulator, poses, workers=0)
     with pytest.raises(InputError, match=r"s1 has shape \(2,\)"):

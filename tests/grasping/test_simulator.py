@@ -206,6 +206,9 @@ def test_a_posture_may_be_a_scalar_of_numpy(simulator):
 def test_postures_that_are_not_finite_are_refused(simulator):
     with pytest.raises(InputError, match="s1 is inf"):
         simulator.grasp(Pose(), float("inf"))
+    for wrong in ([-0.7], None, "x", (None,)):
+        with pytest.raises(InputError, match=r"s1 is .*; give a finite number"):
+            simulator.grasp(Pose(), wrong)
 
 
 def test_joints_of_another_hand_and_without_value_are_refused(simulator):

@@ -74,6 +74,8 @@ def grasp_batch(
     """
     if isinstance(workers, bool) or not isinstance(workers, int | np.integer) or workers < 1:
         raise InputError(f"workers are {workers!r}; give an integer of 1 or more.")
+    if isinstance(poses, Pose):
+        raise InputError("one pose is given for a batch; give a list of poses, or use Simulator.grasp.")
     postures = np.asarray(s1, dtype=np.float64)
     if postures.shape[:1] not in ((), (len(poses),)) or postures.ndim > 2:
         raise InputError(f"s1 has shape {postures.shape}; give one number or one for each of the {len(poses)} poses.")
@@ -114,7 +116,10 @@ def _compiled_outcomes(
     """Return (n, 5) as `_outcomes` does, from the compiled loop in threads."""
     matrices = np.empty((len(poses), 3, 4))
     for matrix, pose in zip(matrices, poses, strict=True):
-        matrix[:] = pose.matrix if isinstance(pose, Pose) else pose
+        given = pose.matrix if isinstance(pose, Pose) else np.asarray(pose)
+        if given.shape not in ((3, 4), (4, 4)):
+            raise InputError(f"a pose of the batch has shape {given.shape}; give poses, or matrices (n, 3, 4).")
+        matrix[:] = given[:3]
     if not (np.isfinite(matrices).all() and np.isfinite(postures).all()):
         raise InputError("a pose or posture of the batch is not finite; give finite numbers.")
     check_rotations(matrices[:, :, :3])

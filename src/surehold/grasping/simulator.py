@@ -1,5 +1,6 @@
 """One trial: put the open hand at a pose, close it, find the contacts, measure how well they hold the object."""
 
+from math import isfinite
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -148,8 +149,12 @@ class Simulator:
             If the pose or s1 is not finite, or the pose's quaternion is zero.
         """
         check_pose(pose)
-        if not np.all(np.isfinite(s1)):
-            raise InputError(f"s1 is {s1!r}; give finite numbers [rad].")
+        try:
+            finite = all(map(isfinite, s1)) if isinstance(s1, tuple) else isfinite(s1)
+        except TypeError:
+            finite = False
+        if not finite:
+            raise InputError(f"s1 is {s1!r}; give a finite number [rad], or a tuple of all amplitudes.")
         relative = self._to_object @ pose if self.object_pose != Pose() else pose
         start = self.motion_start(s1)
         opened = np.clip(start, self.hand.lower, self.hand.upper)

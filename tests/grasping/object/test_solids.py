@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -86,3 +88,19 @@ def test_unknown_object_and_bad_numbers_are_explained():
         GraspObject("thing", mug.vertices, mug.faces, 1.0, mug.center_of_mass, friction=-1.0)
     with pytest.raises(InputError, match="mass"):
         GraspObject("thing", mug.vertices, mug.faces, float("nan"), mug.center_of_mass)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"vertices": np.full((4, 3), np.nan)}, "vertices of 'mug' are not finite"),
+        ({"vertices": np.empty((0, 3))}, "vertices of 'mug'"),
+        ({"faces": np.array([[0, 1, -1]])}, r"faces of 'mug' are not \(f, 3\), one or more, of 0 to"),
+        ({"faces": np.array([[0, 1, 10**6]])}, "faces of 'mug'"),
+        ({"center_of_mass": np.array([np.nan, 0.0, 0.0])}, "center_of_mass of 'mug' is"),
+        ({"axes": 2.0 * np.eye(3)}, "axes of 'mug' are no rotation"),
+    ],
+)
+def test_arrays_that_are_no_object_are_explained(changed, words):
+    with pytest.raises(InputError, match=words):
+        replace(shipped_object("mug"), **changed)

@@ -42,6 +42,17 @@ class GraspObject:
             raise InputError(f"friction of '{self.name}' is {self.friction!r}; give a positive number such as 0.5.")
         if not (np.isfinite(self.mass) and self.mass > 0.0):
             raise InputError(f"mass of '{self.name}' is {self.mass!r}; give a positive number of kilograms.")
+        points, faces = np.asarray(self.vertices), np.asarray(self.faces)
+        if points.ndim != 2 or points.shape[1] != 3 or not len(points) or not np.all(np.isfinite(points)):
+            raise InputError(f"vertices of '{self.name}' are not finite numbers (v, 3), one or more; give meters.")
+        if faces.ndim != 2 or faces.shape[1] != 3 or not len(faces) or faces.min() < 0 or faces.max() >= len(points):
+            raise InputError(f"faces of '{self.name}' are not (f, 3), one or more, of 0 to {len(points) - 1}.")
+        if np.shape(self.center_of_mass) != (3,) or not np.all(np.isfinite(self.center_of_mass)):
+            raise InputError(
+                f"center_of_mass of '{self.name}' is {self.center_of_mass!r}; give three numbers in meters."
+            )
+        if np.shape(self.axes) != (3, 3) or not np.allclose(self.axes.T @ self.axes, np.eye(3), atol=1e-6):
+            raise InputError(f"axes of '{self.name}' are no rotation (3, 3); give the axes of its box as unit columns.")
 
     @property
     def box_center(self) -> NDArray[np.float64]:
