@@ -10,7 +10,7 @@ from surehold.reports.page import render
 
 
 def test_every_figure_is_drawn(gm_report, rkhs_report):
-    names = {"overview", "trace", "shake_highest_observed", "shake_recommended", "surface_mean", "surface_unscented"}
+    names = {"overview", "trace", "shake_highest_observed", "shake_recommended", "surface_mean", "surface_averaged"}
     assert set(figures.figures(gm_report)) == names
     drawn = set(figures.figures(rkhs_report))
     assert {"overview", "trace", "surface", "shake_recommended"} <= drawn
@@ -161,6 +161,11 @@ def test_a_single_trial_is_number_0(rkhs_report):
     assert {float(tick) % 1.0 for tick in axes.get_xticks()} == {0.0}
     page = render(one)
     assert "<b>1</b> trial (1 initial)" in page
+    nearly = replace(one, y=np.array([1e-9]), best_trace=np.array([1e-9]), robust_trace=np.array([1e-9 * (1 + 4e-16)]))
+    axes = figures.trace(nearly).axes[0]
+    low, high = axes.get_ylim()
+    assert sum(low <= tick <= high for tick in axes.get_yticks()) >= 3, "an axis with numbers"
+    assert [line.get_marker() for line in axes.lines if "recommended" in str(line.get_label())] == ["o"]
     assert "<summary>The only trial</summary>" in page
 
 

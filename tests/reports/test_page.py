@@ -54,7 +54,7 @@ def test_the_page_says_what_happened(gm_report, gm_page):
     assert f"{gm_report.observed.mean:.4f}" in words
     assert f"{gm_report.recommended.mean:.4f}" in words
     assert "seed 1" in words
-    assert "Unscented mean" in words
+    assert "Averaged over the input noise" in words
     assert words.count("initial") >= 8
 
 
@@ -165,3 +165,20 @@ def test_figures_can_be_pointed_at_and_looked_at_closely(gm_page, gm_report, tmp
     *_, width, height = (float(number) for number in whole.split())
     expected = [width / 4, height / 4, width / 2, height / 2]
     assert [float(number) for number in closer.split()] == pytest.approx(expected, abs=1.0)  # events know whole pixels
+
+
+@pytest.mark.parametrize(
+    ("deviations", "normal", "said"),
+    [
+        ((0.1, 0.1), True, "ring: two standard deviations of the input noise, where about 86 % of"),
+        ((0.1, 0.1), False, "ring: two standard deviations of the input noise</li>"),
+        ((0.1, 0.0), True, "line: two standard deviations of the input noise to each side, where about 95 % of"),
+    ],
+)
+def test_what_lies_within_two_deviations_is_said_of_normal_noise_only(gm_report, deviations, normal, said):
+    covariance = np.diag(np.square(deviations))
+    both = tuple(replace(c, noise=covariance) for c in gm_report.candidates)
+    assert said in render(replace(gm_report, candidates=both, normal_noise=normal))
+    drawn = np.random.default_rng(0).standard_normal((100_000, 2))
+    within = {2: np.hypot(*drawn.T) < 2.0, 1: abs(drawn[:, 0]) < 2.0}[np.count_nonzero(deviations)]
+    assert f"{100.0 * within.mean():.0f} %" in said or not normal

@@ -179,3 +179,14 @@ def test_a_trial_that_met_a_good_condition_is_refused():
     told = verdict(report)
     assert "when conditions differ" in told.headline + told.text
     assert report.robust_trace is not None
+
+
+def test_re_queries_that_were_kept_in_the_box_are_told():
+    box, noise = sh.Box({"x": (0.0, 1.0)}), sh.InputNoise.unit(0.1)
+    result = sh.maximize(lambda x: float(x[0]), box, 9, input_noise=noise, seed=0)
+    assert result.recommendation.x[0] > 0.99
+    report = result_report(result, lambda x: float(x[0]))
+    kept = int(np.sum(report.recommended.points[:, 0] == report.recommended.x[0]))
+    assert 30 < kept < 70
+    assert any(f"(in {kept} of 100 of the recommended point)" in note for note in report.notes)
+    assert not any("kept its commanded value" in note for note in result_report(result).notes)

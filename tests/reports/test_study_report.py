@@ -181,7 +181,7 @@ def test_a_browser_draws_the_dashboard(dashboard, tmp_path):
         ["chromium", *flags, "--virtual-time-budget=15000", "--dump-dom", dashboard],
         capture_output=True, text=True, timeout=600, check=True,
     )  # fmt: skip
-    for title in ("Highest observed and robust value", "Model under the input noise (unscented mean)"):
+    for title in ("Highest observed and robust value", "Model averaged over the input noise"):
         assert title in run.stdout, "the plot was not drawn"
 
 

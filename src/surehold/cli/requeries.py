@@ -1,16 +1,15 @@
 """The perturbed re-queries of a run's points: announced where they take long, left out at Ctrl-C."""
 
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 
-import numpy as np
 from rich.console import Console
 
 from surehold.optimization.maximization import Result
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.recommendation import MANY_OUTSIDE
 from surehold.problems.perturbation import RobustScore, robust_score
 from surehold.problems.problem import Problem
+from surehold.reports import gather
 
 __all__ = ["requeried"]
 
@@ -49,19 +48,4 @@ def requeried(
             scores[label, index] = robust_score(problem, result.X[index], noise, n, seed, told)
         except KeyboardInterrupt:
             return scores, [f"The re-queries of the {label} point were interrupted and left out."]
-    return scores, _held(scores, result)
-
-
-def _held(scores: Mapping[tuple[str, int], RobustScore | None], result: Result) -> list[str]:
-    """Return in words how many re-queries would have left the box, where many would and were kept in it."""
-    nobody, parts = result.optimizer.box.uncontrolled, []
-    for (label, index), score in scores.items():
-        if score is not None:
-            held = (score.points == result.X[index]) & (np.ptp(score.points, axis=0) > 0.0)
-            if nobody is not None:
-                held &= ~nobody.held
-            count, n = int(np.any(held, axis=1).sum()), len(score.points)
-            if count >= MANY_OUTSIDE * n:
-                parts.append(f"{count} of {n} of the {label} point")
-    kept = "a variable that would have left it kept its commanded value"
-    return [f"Re-queries stay in the box: {kept} (in {', '.join(parts)})."] if parts else []
+    return scores, gather.kept_in_box(scores, result)

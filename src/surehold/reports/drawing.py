@@ -164,7 +164,7 @@ def draw_map(axes: "Axes", report: RunReport, view: Surface, robust: bool) -> No
     for candidate in report.candidates:
         _draw_candidate(axes, report, candidate, (i, j))
     axes.set(xlabel=first.label, ylabel=second.label)
-    axes.set_title("Unscented mean (over the input noise)" if robust else "Model mean (input hit exactly)")
+    axes.set_title("Averaged over the input noise" if robust else "Model mean (input hit exactly)")
     bar = axes.figure.colorbar(image, ax=axes, fraction=0.05, pad=0.02, aspect=25)
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     bar.set_label(report.axis_name)
@@ -260,6 +260,7 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             where="post",
             color=PALETTE["high"],
             linewidth=1.8,
+            marker="_" if k.size == 1 else "",
             label=f"{report.extreme} value so far",
         )
     if report.robust_trace is not None and report.succeeded and np.isfinite(report.robust_trace).any():
@@ -268,6 +269,8 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             report.robust_trace,
             color=PALETTE["answer"],
             linewidth=1.8,
+            marker="o" if np.isfinite(report.robust_trace).sum() == 1 else "",  # one place makes no line
+            markersize=4.5,
             label=f"recommended: {report.expected_name}",
         )
     if 0 < report.n_initial < report.y.size:
@@ -286,6 +289,10 @@ def draw_trace(axes: "Axes", report: RunReport) -> None:
             color=PALETTE["muted"],
         )
     axes.margins(y=0.12)
+    low, high = sorted(axes.get_ylim())
+    if high - low <= _FLAT * max(abs(low), abs(high)):  # rounding has no ticks
+        room = 0.05 * max(abs(low), abs(high))
+        axes.set_ylim(low - room, high + room)
     if report.counted:
         axes.set_ylim(_SHARES)
     set_scale(axes, "x", (-0.5, max(k[-1] + 0.5, 0.6) if k.size else 0.6), whole=True)

@@ -58,7 +58,7 @@ def surface_names(report: RunReport, index: int) -> dict[bool, str]:
     if len(view.variables) == 1:
         return {False: f"surface{end}"}  # one figure shows both lines
     names = {False: f"surface_mean{end}"}
-    return names if view.robust_mean is None else names | {True: f"surface_unscented{end}"}
+    return names if view.robust_mean is None else names | {True: f"surface_averaged{end}"}
 
 
 def shake(report: RunReport, candidate: Candidate) -> "Figure":

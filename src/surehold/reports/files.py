@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,11 @@ def write_result(report: RunReport, folder: str | Path) -> None:
 
 
 def result_data(report: RunReport) -> dict[str, Any]:
-    """Return the run as JSON-ready data in the units of the box; missing numbers are null."""
+    """Return the run as JSON-ready data; missing numbers are null.
+
+    `parameters` are the inputs by name, in the user's units; `x` and all that belongs to it, the noise included, are
+    coordinates of the variables: the same numbers, but for a logarithmic one the logarithm, and without the choices.
+    """
     from surehold import __version__
 
     return _plain(
@@ -59,7 +64,14 @@ def result_data(report: RunReport) -> dict[str, Any]:
             "input_noise_covariance": report.noise,
             "quality": report.quality_name,
             "n_initial": report.n_initial,
-            "trials": {"number": report.numbers, "x": report.X, "y": report.y},
+            "trials": {
+                "number": report.numbers,
+                "x": report.X,
+                "y": report.y,
+                "parameters": report.parameters,
+                "outputs": dict(report.outputs),
+                "feasible": ~report.failed if report.feasible is None else report.feasible,
+            },
             "best": report.best_trace,
             "robust": report.robust_trace,
             "candidates": [_candidate(report, c) for c in report.candidates],
@@ -71,6 +83,7 @@ def _candidate(report: RunReport, candidate: Candidate) -> dict[str, Any]:
     return {
         "label": candidate.label,
         "x": candidate.x,
+        "parameters": report.parameters[candidate.trial] if report.parameters and candidate.trial is not None else None,
         "trial": None if candidate.trial is None else report.numbers[candidate.trial],
         "quality": candidate.quality,
         "mean": candidate.mean,
@@ -88,7 +101,7 @@ def _candidate(report: RunReport, candidate: Candidate) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())

@@ -11,7 +11,7 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.maximization import Result
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.recommendation import outliers_in_words, outside_in_words
+from surehold.optimization.recommendation import MANY_OUTSIDE, outliers_in_words, outside_in_words
 from surehold.optimization.variables import Number
 from surehold.problems.perturbation import RobustScore
 from surehold.reports.run_report import (
@@ -30,7 +30,7 @@ from surehold.reports.surfaces import surfaces_of
 if TYPE_CHECKING:
     from surehold.grasping.pictures.scene import Scene as GraspScene
 
-__all__ = ["answers", "candidate", "drawn_scene", "report_of"]
+__all__ = ["answers", "candidate", "drawn_scene", "kept_in_box", "report_of"]
 
 _SHARES = (0.9, 0.99)  # of executions that succeed, of which the page says how sure they are
 _ADVICE = "Give more trials, a wider box, or count as success what is easier to reach."
@@ -206,6 +206,7 @@ def report_of(
             replace(
                 candidate,
                 x=candidate.x[shown],
+                points=candidate.points[:, shown] if candidate.points.size else candidate.points,
                 noise=None if noise is None else _covariance_at(noise, box, candidate.x)[np.ix_(shown, shown)],
             )
             for candidate in candidates
@@ -236,10 +237,29 @@ def report_of(
             ),
         ),
         choices=choices or {},
+        parameters=tuple(box.as_given(x) for x in optimizer.reached),
+        outputs=_outputs(result),
+        feasible=None if np.array_equal(optimizer.feasible, np.isfinite(y)) else optimizer.feasible,
         minimized=minimized,
+        normal_noise=noise is not None and noise.kind.gaussian,
         counted=counted,
         ids=ids,
     )
+
+
+def kept_in_box(scores: Mapping[tuple[str, int], RobustScore | None], result: Result) -> list[str]:
+    """Return in words how many re-queries would have left the box, where many would and were kept in it."""
+    nobody, parts = result.optimizer.box.uncontrolled, []
+    for (label, index), score in scores.items():
+        if score is not None:
+            held = (score.points == result.X[index]) & (np.ptp(score.points, axis=0) > 0.0)
+            if nobody is not None:
+                held &= ~nobody.held
+            count, n = int(np.any(held, axis=1).sum()), len(score.points)
+            if count >= MANY_OUTSIDE * n:
+                parts.append(f"{count} of {n} of the {label} point")
+    kept = "a variable that would have left it kept its commanded value"
+    return [f"Re-queries stay in the box: {kept} (in {', '.join(parts)})."] if parts else []
 
 
 def drawn_scene(scene: "GraspScene") -> Scene:
@@ -264,6 +284,14 @@ def _covariance_at(noise: InputNoise, box: Box, x: NDArray[np.floating]) -> NDAr
 
 def _unit_answer(result: Result) -> NDArray[np.float64]:
     return result.optimizer.box.to_unit(result.recommendation.x)
+
+
+def _outputs(result: Result) -> dict[str, tuple[Any, ...]]:
+    """Return the further outputs of the trials by name, None where a trial told none."""
+    names = dict.fromkeys(name for trial in result.trials for name in trial.outputs)
+    if len(result.trials) != len(result.y):
+        return {}
+    return {name: tuple(trial.outputs.get(name) for trial in result.trials) for name in names}
 
 
 def _countable(result: Result) -> NDArray[np.bool_]:

@@ -35,41 +35,20 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
         words.append(("success", "1 where a trial succeeded, 0 where it did not; the share of several executions."))
     else:
         words.append(("hit exactly", "The value of the trial itself, which reached its input."))
-    if report.extreme.endswith("feasible"):
+    if report.extreme.endswith("feasible") or (report.feasible is not None and not report.feasible.all()):
         meaning = "Fit to be the answer: allowed, inside of the box, within all limits, and not prone to fail."
         words.append(("feasible", meaning))
     if report.noise is not None:
-        words += [
-            (
-                "input noise",
-                "How far an execution ends up from what is commanded: ± gives one standard deviation of each variable.",
-            ),
-            (
-                "re-queries",
-                "The point tried again, each time moved by the input noise. They only score the two points, are the "
-                "same moves for both, and are no part of the budget.",
-            ),
-            (
-                "95 % of them are better than",
-                f"{better.capitalize()} is better: one re-query in twenty is worse than this.",
-            ),
-            (
-                "mean under the noise",
-                "What many executions give on average. Its uncertainty is what the model does not know yet; it shrinks "
-                "with further trials.",
-            ),
-            *_measure(report),
-            (
-                "one execution",
-                "What the next execution gives. Its standard deviation holds the input noise, the noise of the "
-                "measurement and the model's uncertainty; trials do not make it vanish.",
-            ),
-            (
-                "unscented mean",
-                "The model averaged over a few points around an input that stand for the input noise: the map in which "
-                "a good place is one that holds.",
-            ),
-        ]
+        meaning = "How far an execution ends up from what is commanded: ± gives one standard deviation of a variable."
+        words.append(("input noise", meaning))
+    if any(candidate.values.size or candidate.n_failed for candidate in report.candidates):
+        moved = "moved by the input noise" if report.noise is not None else "under conditions drawn anew"
+        same = "They only score the two points, are the same moves for both, and are no part of the budget."
+        words.append(("re-queries", f"The point tried again, each time {moved}. {same}"))
+    words += [] if report.counted else _of_executions(report, better)
+    if any(view.robust_mean is not None for view in report.surfaces):
+        meaning = "The model's mean over where an execution may end up: there a good place is one that holds."
+        words.append(("averaged over the input noise", meaning))
     quality, contact = str(report.settings.get("quality", "")), report.settings.get("contact")
     if quality in _QUALITIES:
         words.append((f"quality ({quality})", _QUALITIES[quality]))
@@ -82,6 +61,23 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
         )
     if "s1" in [v.name for v in report.variables] or any("s1" in c.pose for c in report.candidates):
         words.append(("s1", "Posture of the hand along its first synergy, in radians; here it turns the thumb."))
+    return words
+
+
+def _of_executions(report: RunReport, better: str) -> list[tuple[str, str]]:
+    """Return the words for what executions give, of those that are on the page."""
+    words = []
+    if any(candidate.values.size for candidate in report.candidates):
+        meaning = f"{better.capitalize()} is better: one re-query in twenty is worse than this."
+        words.append(("95 % of them are better than", meaning))
+    if any(candidate.predicted_mean is not None for candidate in report.candidates):
+        unsure = "Its uncertainty is what the model does not know yet; it shrinks with further trials."
+        words.append(("mean under the noise", f"What many executions give on average. {unsure}"))
+    words += _measure(report)
+    if any(candidate.predicted_std is not None for candidate in report.candidates):
+        meaning = "What the next execution gives. Its standard deviation holds the input noise, the noise of the "
+        meaning += "measurement and the model's uncertainty; trials do not make it vanish."
+        words.append(("one execution", meaning))
     return words
 
 

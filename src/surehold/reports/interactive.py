@@ -24,7 +24,7 @@ def interactive_plots(report: RunReport) -> dict[str, str]:
             report, surface, surface.mean, "Model: expected value where the input is exact"
         )
         if surface.robust_mean is not None:
-            title = "Model under the input noise (unscented mean)"
+            title = "Model averaged over the input noise"
             plots["surehold-3-under-noise"] = _map(report, surface, surface.robust_mean, title)
     return {name: json.dumps(plot, allow_nan=False) for name, plot in plots.items()}
 
@@ -55,7 +55,7 @@ def _line(report: RunReport, surface: Surface) -> dict[str, Any]:
         around = np.concatenate([grid, grid[::-1]])
         data.insert(0, _curve(around, band, "± 2 standard deviations", _TRIAL) | shade)
     if surface.robust_mean is not None:
-        data.append(_curve(grid, surface.robust_mean, "under the input noise (unscented mean)", _ANSWER))
+        data.append(_curve(grid, surface.robust_mean, "averaged over the input noise", _ANSWER))
     column = variable.shown(report.X[:, surface.variables[0]])
     data.append(_points(column, report.y, "trials", {"color": _TRIAL, "size": 6}))
     for x, y, name, color in _candidates(report):

@@ -13,6 +13,7 @@ from surehold.reports.drawing import marked
 from surehold.reports.glossary import glossary
 from surehold.reports.run_report import Candidate, RunReport, Scene, Surface, Variable
 from surehold.reports.scene import scene_data
+from surehold.reports.trial_rows import trial_rows
 from surehold.reports.verdict import verdict
 from surehold.reports.wording import change, coordinate, coordinates, halved, number, percent, worth
 
@@ -44,7 +45,7 @@ def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
     if drawings is None:
         drawings = {name: figures.svg_text(figure, name) for name, figure in figures.figures(report).items()}
     shown = [c for c in report.candidates if c.scene is not None]
-    trials = _trials(report)
+    trials = trial_rows(report)
     hover = _hover(report, trials)
     return (
         environment()
@@ -226,9 +227,21 @@ def _map(report: RunReport, index: int, drawings: Mapping[str, str], trials: lis
     names = " and ".join(report.variables[i].name for i in view.variables)
     hover, pictures = _hover(report, trials, view), []
     for robust, name in figures.surface_names(report, index).items():
-        text = f"{'Unscented mean' if robust else 'Mean'} of the model over {names}, with the trials"
+        text = f"{'Average over the input noise' if robust else 'Mean'} of the model over {names}, with the trials"
         pictures.append(Markup(figures.inline_svg(drawings[name], name, text, hover)))
-    return {"note": view.note, "is_map": len(view.variables) == 2, "svgs": pictures}
+    return {"note": view.note, "is_map": len(view.variables) == 2, "ring": _ring(report, view), "svgs": pictures}
+
+
+def _ring(report: RunReport, view: Surface) -> str:
+    """Return what is drawn around the candidates of a map; how much lies within is known of normal noise only."""
+    if report.noise is None:
+        return ""
+    held = np.linalg.matrix_rank(report.noise[np.ix_(view.variables, view.variables)], hermitian=True)
+    what = {0: "", 1: "line: two standard deviations of the input noise to each side"}
+    share = {1: 95, 2: 86}  # erf(sqrt(2)), and 1 - exp(-2)
+    text = what.get(int(held), "ring: two standard deviations of the input noise")
+    within = f", where about {share.get(int(held), 0)} % of imprecise executions end up"
+    return text + within * bool(text and report.normal_noise)
 
 
 def table_rows(report: RunReport) -> list[tuple[str, list[str]]]:
@@ -294,27 +307,3 @@ def _setting(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _trials(report: RunReport) -> list[dict[str, Any]]:
-    rows = []
-    for i, (x, y) in enumerate(zip(report.X, report.y, strict=True)):
-        notes, style = (["initial"] if i < report.n_initial else []), ""
-        if report.observed.trial == i and not report.counted:
-            notes.append(f"{report.extreme} observed")
-            style = "best"
-        if report.recommended.trial == i:
-            notes.append("recommended" if report.succeeded else "shown")
-            style = "chosen"
-        failed = not np.isfinite(y)
-        rows.append(
-            {
-                "number": int(report.numbers[i]),
-                "x": [coordinate(v, value, 4) for v, value in zip(report.variables, x, strict=True)],
-                "choices": [texts[i] for texts in report.choices.values()],
-                "y": "failed" if failed else worth(report, float(y), 4),
-                "note": ", ".join(notes),
-                "style": style,
-            }
-        )
-    return rows

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 from surehold.extras import require
 from surehold.optimization.maximization import Result
 from surehold.problems.function import Function
-from surehold.problems.perturbation import robust_score
+from surehold.problems.perturbation import RobustScore, robust_score
 from surehold.reports import figures, files, gather
-from surehold.reports.run_report import RunReport
+from surehold.reports.run_report import Candidate, RunReport
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,12 +54,14 @@ def result_report(result: Result, function: Callable[[Any], float] | None = None
     optimizer = result.optimizer
     box, noise = optimizer.box, optimizer.input_noise
     disturbed = [*["the input is off"] * (noise is not None), *["conditions differ"] * (box.uncontrolled is not None)]
-    candidates = []
+    candidates: list[Candidate] = []
+    scores: dict[tuple[str, int], RobustScore | None] = {}
     for label, index in gather.answers(result).items():
         score = None
         if function is not None and disturbed:
             problem = Function(function if box.plain else lambda x: function(box.as_dict(x)), box)
             score = robust_score(problem, result.X[index], noise, _REQUERIES, optimizer.seed)
+        scores[label, index] = score
         candidates.append(gather.candidate(result, label, index, score))
     plain = [box.as_dict(x) for x in result.X]
     texts = [variable.name for variable in box.variables if variable.name not in box.names]
@@ -72,6 +74,7 @@ def result_report(result: Result, function: Callable[[Any], float] | None = None
         noise=noise,
         disturbance=" and ".join(disturbed) or "the input is off",
         units=units,
+        notes=gather.kept_in_box(scores, result),
         choices={name: tuple(str(row[name]) for row in plain) for name in texts},
         hidden=[name for name in box.names if name not in [variable.name for variable in box.variables]],
     )

@@ -203,7 +203,7 @@ class Surface:
     variables: tuple[int, ...]  #: one or two indices of variables
     axes: tuple[Floats, ...]  #: the grid along each, in the units of the box
     mean: Floats  #: (g,) or (g1, g2) posterior mean
-    robust_mean: Floats | None = None  #: same shape, averaged over the input noise (unscented mean)
+    robust_mean: Floats | None = None  #: same shape, averaged over the input noise
     std: Floats | None = None  #: same shape, posterior standard deviation
     robust_std: Floats | None = None
     note: str = ""  #: such as "slice through the recommended point"
@@ -242,7 +242,11 @@ class RunReport:
     planned_trials: int | None = None
     notes: tuple[str, ...] = ()
     choices: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: parameters that are no numbers: (n,) each
+    parameters: tuple[Mapping[str, Any], ...] = ()  #: every input of the trials in the user's units, (n,), or empty
+    outputs: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)  #: further outputs, (n,) each, or None
+    feasible: NDArray[np.bool_] | None = None  #: (n,) which may be the answer; None where all that gave a value may
     minimized: bool = False  #: whether lower values are better
+    normal_noise: bool = False  #: whether the input noise is normally distributed, the same everywhere
     ids: tuple[int, ...] = ()  #: what the trials are called, (n,); by their places, from 0, where empty
     counted: bool = False  #: whether values are shares of executions that succeeded, 1 or 0 of a single one
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import QUASI_RANDOM_EXPONENT_OF_FEW
 from surehold.errors import InputError
 from surehold.extras import require
 from surehold.optimization.noise.perturbations import Perturbations
@@ -113,6 +114,7 @@ def _model(optimizer: Optimizer, U: NDArray[np.float64]) -> tuple[Any, NDArray[n
     mean, variance = mixture(optimizer.posterior.moments(U))
     if optimizer.input_noise is None:
         return (sign * mean, 2.0 * np.sqrt(variance)), None
-    perturbations = Perturbations.of(optimizer.input_noise, optimizer.box, "unscented")
+    noise, exponent = optimizer.input_noise, QUASI_RANDOM_EXPONENT_OF_FEW
+    perturbations = Perturbations.of(noise, optimizer.box, "quasi_monte_carlo", exponent=exponent)
     averaged, _ = mixture(perturbations.outcome(optimizer.posterior, U))
     return (sign * mean, 2.0 * np.sqrt(variance)), sign * averaged

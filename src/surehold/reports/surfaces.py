@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from surehold.defaults import QUASI_RANDOM_EXPONENT_OF_FEW, SCREENING_EXPONENT
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
@@ -117,7 +118,10 @@ def _surface(
     mean, variance = mixture(posterior.moments(queries))
     robust_mean = robust_std = None
     if noise is not None:
-        averaged, spread = mixture(Perturbations.of(noise, box, "unscented").outcome(posterior, queries))
+        # sigma points, three along a line, draw hills and dips beside a peak that the average does not have
+        exponent = QUASI_RANDOM_EXPONENT_OF_FEW if len(variables) == 1 else SCREENING_EXPONENT
+        perturbations = Perturbations.of(noise, box, "quasi_monte_carlo", exponent=exponent)
+        averaged, spread = mixture(perturbations.outcome(posterior, queries))
         robust_mean, robust_std = sign * averaged.reshape(shape), np.sqrt(spread).reshape(shape)
     axes = tuple(box.lower[k] + line * box.widths[k] for k, line in zip(variables, lines, strict=True))
     return Surface(

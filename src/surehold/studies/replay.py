@@ -63,7 +63,9 @@ def result_of(study: RobotStudy, interrupted: bool = False) -> Result:
         failure = "" if np.isfinite(history.y[i]) else attributes.get(VETOED) or attributes.get(NOTE) or "failed"
         x, y = history.X[i], float(values[i])
         number, answer, parameters = int(history.numbers[i]), recommendations.get(i + 1), optimizer.box.as_dict(x)
-        trials.append(Trial(number, x, y, failure, float(best[i]), answer, 0.0, parameters=parameters))
+        measured = zip(study.sampler.outputs, history.outputs[i].tolist(), strict=True)
+        outputs = {name: value for name, value in measured if np.isfinite(value)}
+        trials.append(Trial(number, x, y, failure, float(best[i]), answer, 0.0, outputs, parameters))
     return Result(optimizer, tuple(trials), recommendations[n], interrupted)
 
 
