@@ -38,6 +38,14 @@ def test_a_yaml_plan_is_the_plan_built_in_python(cheap, cheap_text):
         ("function: rkhs", "function: 'own.py:f'", "has no bounds"),
         ("title: A cheap plan", "title: A cheap plan\nextends: table-4.5", "did you mean 'table-4."),
         ("title: A cheap plan", "title: [", "is no YAML"),
+        ("  flat: {", "  hill: {", "has 'hill' in lines 5 and 6; give it once"),
+        ("trials: 8, initial: 5", "trials: 8, initial: 5, trials: 9", "has 'trials' in lines 5 and 5"),
+        ("  UBO: {", "  no: {", "methods: the label False is no text"),
+        (
+            "  hill: {function: rkhs, trials: 8, initial: 5, input_noise: 0.01, requeries: 20}",
+            "  hill:",
+            "hill is 'None'",
+        ),
     ],
 )
 def test_bad_plans_name_what_is_wrong(cheap_text, old, new, message):
@@ -47,6 +55,8 @@ def test_bad_plans_name_what_is_wrong(cheap_text, old, new, message):
 
 
 def test_a_plan_that_is_no_mapping_is_refused():
+    with pytest.raises(InputError, match="is empty"):
+        parse_plan("# later", "cheap")
     with pytest.raises(InputError, match="give title"):
         parse_plan("- 1\n", "list")
 

@@ -124,3 +124,25 @@ def test_the_hand_is_open_in_the_scenes_of_the_default_pose():
     for scene in scenes.values():
         assert scene.box is not None
         assert len(scene.contacts.points) == 0
+
+
+def test_runs_beyond_the_plan_and_of_methods_that_it_no_longer_has_are_told_apart(tmp_path, cheap):
+    hill = replace(cheap, problems={"hill": cheap.problems["hill"]}, runs=1)
+    run_campaign(hill, tmp_path, runs=2)
+    one = replace(hill, methods={"BO": hill.methods["BO"]})
+    run_campaign(one, tmp_path, runs=2)
+    report = campaign_report(read_campaigns([tmp_path]))
+    assert report.facts[0] == ("2", "of 2 planned runs")
+    assert report.sections[0].tables[0].rows[0][3] == "2 of 2"
+    assert [note for note in report.notes if "no longer has" in note] == [
+        "A cheap plan: 2 runs of problems or methods that the plan no longer has; not shown."
+    ]
+
+
+def test_re_queries_without_a_value_are_told(tmp_path, cheap):
+    run_campaign(cheap, tmp_path, runs=1, only=["hill", "BO"])
+    campaigns = read_campaigns([tmp_path])
+    (row,) = campaigns["cheap"].done.values()
+    row["failed_requeries"] = 7
+    (note,) = campaign_report(campaigns).notes
+    assert "1 run gave no value in some re-queries (7 at most)" in note

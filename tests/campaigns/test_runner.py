@@ -238,3 +238,19 @@ def test_short_runs_travel_together_and_long_ones_alone(monkeypatch):
     assert sorted(row["seed"] for row in rows) == list(seconds)
     assert max(sizes) > 10, "short runs travelled alone"
     assert sizes[-1] <= 2, "long runs travelled together"
+
+
+def test_runs_of_another_text_of_the_function_are_not_mixed(tmp_path, cheap, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.py").write_text("def f(x):\n    return -float((x[0] - 0.3) ** 2)\n")
+    own = replace(cheap, problems={"own": ProblemSetup("own.py:f", 6, 5, {"bounds": "x=0:1"}, 0.05)}, runs=1)
+    run_campaign(own, tmp_path / "out", only=["BO"])
+    (tmp_path / "own.py").write_text("def f(x):\n    return -float((x[0] - 0.9) ** 2)\n")
+    with pytest.raises(InputError, match="BO on own with another function_file than the plan"):
+        run_campaign(own, tmp_path / "out", runs=2, only=["BO"])
+
+
+def test_a_parameter_of_a_measure_that_is_not_named_is_refused(tmp_path, cheap):
+    share = replace(cheap, methods={"worst share": MethodSetup(robust=True, settings={"alpha": 0.1})})
+    with pytest.raises(InputError, match=r"alpha is 0\.1, but no risk is given"):
+        run_campaign(share, tmp_path)

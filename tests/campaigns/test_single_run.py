@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from surehold.campaigns.plan import MethodSetup, Plan, ProblemSetup
 from surehold.campaigns.plan_file import load_plan
 from surehold.campaigns.single_run import TIMES, changes, expanded, run_once
+from surehold.optimization.box import Box
 from surehold.optimization.maximization import maximize
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.named import robust_problem
-from surehold.problems.perturbation import robust_score
+from surehold.problems.perturbation import perturbed_points, robust_score
 from surehold.problems.synthetic import RKHS, synthetic_function
 
 OWN = """
@@ -160,3 +161,31 @@ def test_regret_under_a_problems_own_noise():
     best = problem.function.box.from_unit(np.array(row["x"]))
     assert row["regret"][-1][1] == pytest.approx(problem.optimum.value - problem.value(best[None])[0], abs=1e-6)
     assert min(regret for _, regret in row["regret"]) > -1e-5
+
+
+def test_re_queries_without_a_value_count_as_the_lowest_of_the_run(tmp_path, monkeypatch):
+    """An answer beside a crash must not be praised for losing its bad cases."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.py").write_text(OWN)
+    on = ProblemSetup("own.py:slips", 10, 6, {"bounds": "x=0:1"}, input_noise=0.05)
+    row = run_once(cell_of(on, MethodSetup(settings={"surrogate": "gp"})), 1)
+    (x,) = row["x"]
+    reached = perturbed_points([x], Box({"x": (0.0, 1.0)}), InputNoise.unit(0.05), 100, 1)[:, 0]
+    lost = reached > 0.6
+    assert row["failed_requeries"] == np.count_nonzero(lost) > 10
+    lowest = min(value for value in maximize_told(row, on) if np.isfinite(value))
+    values = np.where(lost, lowest, reached)
+    ended = [row[name][-1][1] for name in ("mean", "worst", "std")]
+    assert ended == pytest.approx([values.mean(), values.min(), values.std(ddof=1)], rel=1e-8)
+
+
+def maximize_told(row, on):
+    """Return the values of the trials of a run without noise: those of `maximize` with the same seed."""
+
+    def slips(x):
+        if x[0] > 0.6:
+            raise RuntimeError("slipped")
+        return float(x[0])
+
+    box = Box({"x": (0.0, 1.0)})
+    return maximize(slips, box, on.trials, n_initial=on.initial, seed=row["seed"], surrogate="gp").y

@@ -88,6 +88,10 @@ def test_more_runs_and_more_methods_are_welcome(tmp_path, cheap):
     grown = replace(cheap, runs=9, methods={**cheap.methods, "third": cheap.methods["BO"]})
     with opened(tmp_path, grown) as table:
         assert len(table.records.rows) == 2
+    kept = read_folder(tmp_path)
+    assert kept.runs == 9, "also where the process is killed before it sorts the table"
+    assert ("hill", "third") in kept.cells
+    assert len(kept.rows) == 2
 
 
 def test_two_processes_on_one_folder(tmp_path, cheap):

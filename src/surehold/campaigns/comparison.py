@@ -134,7 +134,7 @@ def rows_of(records: Records) -> list[Row]:
                     problem,
                     method,
                     measure,
-                    records.header["runs"],
+                    records.runs,
                     lost,
                     summary(values) if values else None,
                     theirs,

@@ -54,12 +54,12 @@ def total_cost_table(campaigns: Mapping[str, Records]) -> Table:
         for (problem, method, _), row in records.done.items():
             seconds.setdefault((problem, method), []).append(row["cpu_seconds"])
         cells = [(cell["problem"], cell["method"]) for cell in records.header["cells"]]
-        planned = records.header["runs"]
+        planned = records.runs
         known = [sum(seconds[cell]) / len(seconds[cell]) for cell in cells if cell in seconds]
         body.append(
             (
                 plan,
-                f"{sum(map(len, seconds.values()))} of {planned * len(cells)}",
+                f"{sum(len(seconds[cell]) for cell in cells if cell in seconds)} of {planned * len(cells)}",
                 number(sum(map(sum, seconds.values())) / 60.0, 3),
                 number(sum(known) * planned / 60.0, 3) if len(known) == len(cells) else "–",
             )

@@ -71,6 +71,9 @@ class Surehold:
         options = {name: own.pop(name) for name in ("alpha", "beta") if name in own}
         if "risk" in own:
             own["risk"] = Risk(own["risk"], **options)
+        elif options:
+            name, value = next(iter(options.items()))
+            raise InputError(f"{name} is {value!r}, but no risk is given; name the measure, such as risk: cvar.")
         self._optimizer = Optimizer(box, input_noise=input_noise, n_initial=len(initial), seed=seed, **own)
         self._waiting = list(initial)
 

@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from surehold.errors import InputError, unknown_name
@@ -70,6 +71,7 @@ class Cell:
         if by.optimizer == "surehold" and own.get("preset") is None and own.get("surrogate") is None:
             own["surrogate"] = DEFAULT_SURROGATE  # another version has another: its runs are not these
         return {
+            **_source(on.function),
             "function": on.function,
             "arguments": dict(on.arguments),
             "trials": on.trials,
@@ -204,6 +206,17 @@ def share_of(text: str) -> tuple[int, int]:
     if not 1 <= i <= n:
         raise InputError(f"shard is {i}/{n}; give i/n with i from 1 to n, such as 2/8.")
     return i, n
+
+
+def _source(function: str) -> dict[str, str]:
+    """Return a fingerprint of the file of one's own function: of another text the runs are not these."""
+    place = Path(function.rpartition(":")[0])
+    if place.suffix != ".py":
+        return {}
+    try:
+        return {"function_file": hashlib.sha256(place.read_bytes()).hexdigest()[:12]}
+    except OSError:  # where the function is loaded it is told what is wrong with the file
+        return {}
 
 
 def _plain(value: Any) -> Any:

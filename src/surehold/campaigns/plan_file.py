@@ -80,12 +80,15 @@ def _document(text: str, name: str) -> dict[str, Any]:
     if len(text) > _LONGEST:
         raise InputError(f"plan '{name}' is longer than {_LONGEST:,} characters; split it.")
     try:
+        _check_keys(yaml.compose(text, yaml.SafeLoader), name)
         document = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # ValueError: a date or a number that is none
         raise InputError(f"plan '{name}' is no YAML: {' '.join(str(error).split())[:300]}") from None
     except RecursionError:
         raise InputError(f"plan '{name}' is nested too deeply; a plan has five levels.") from None
     _check_size(document, name)
+    if document is None:
+        raise InputError(f"plan '{name}' is empty; give title, problems and methods.")
     if not isinstance(document, dict):
         raise InputError(f"plan '{name}' is {type(document).__name__}; give title, problems and methods.")
     base = document.pop("extends", None)
@@ -94,6 +97,24 @@ def _document(text: str, name: str) -> dict[str, Any]:
     if base not in shipped_plans():
         raise unknown_name(f"plan that '{name}' extends", base, shipped_plans())
     return _merged(_document((_PLANS / f"{base}.yaml").read_text(encoding="utf-8"), base), document)
+
+
+def _check_keys(root: Any, name: str) -> None:
+    """Raise InputError where a mapping has one key twice, of which YAML keeps the last without a word."""
+    waiting, seen = [root], set()
+    while waiting:
+        node = waiting.pop()
+        if id(node) in seen or not isinstance(getattr(node, "value", None), list):
+            continue
+        seen.add(id(node))  # an alias may make a document endless
+        pairs = [part for part in node.value if isinstance(part, tuple)]
+        first: dict[str, Any] = {}
+        for key, value in pairs:
+            if isinstance(key.value, str) and key.value != "<<" and first.setdefault(key.value, key) is not key:
+                lines = first[key.value].start_mark.line + 1, key.start_mark.line + 1
+                raise InputError(f"plan '{name}' has '{key.value}' in lines {lines[0]} and {lines[1]}; give it once.")
+            waiting += [key, value]
+        waiting += [] if pairs else node.value
 
 
 def _check_size(document: Any, name: str) -> None:
@@ -184,6 +205,11 @@ def _explained(problem: Mapping[str, Any], name: str, models: Mapping[str, Any])
     if problem["type"] == "missing":
         return InputError(f"{where}: '{last}' is missing; give it.")
     given = str(problem.get("input"))[:60]
+    if last == "[key]":
+        where = f"plan '{name}', {parents[0]}"
+        return InputError(f"{where}: the label {given} is no text; write it in quotes.")
+    if problem["type"] == "model_type":
+        return InputError(f"{where}: {last} is {given!r}; give its settings, {{NAME: VALUE, ...}}.")
     return InputError(f"{where}: {last} is {given!r}; {problem['msg'][0].lower()}{problem['msg'][1:]}.")
 
 

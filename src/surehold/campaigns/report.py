@@ -1,6 +1,6 @@
 """The report of campaigns: one page, a CSV a table and the figures, from the tables in given folders."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -93,16 +93,16 @@ def campaign_report(campaigns: dict[str, Records], *, illustrated: bool = True) 
     if thesis and illustrated:
         sections.append(Section("Figures that need no runs", "", (), tuple(illustrations())))
         scenes = grasp_scenes(_bottle_answers(campaigns))
-    runs = sum(len(records.done) for records in campaigns.values())
-    planned = sum(len(records.header["cells"]) * records.header["runs"] for records in campaigns.values())
-    failed = sum(len(records.failed) for records in campaigns.values())
+    runs = sum(_shown(records, records.done) for records in campaigns.values())
+    planned = sum(len(records.cells) * records.runs for records in campaigns.values())
+    failed = sum(_shown(records, records.failed) for records in campaigns.values())
     facts = [
         (f"{runs:,}", f"of {planned:,} planned runs"),
         (str(len(campaigns)), "campaign" if len(campaigns) == 1 else "campaigns"),
     ]
     if failed:
         facts.append((str(failed), "failed run" if failed == 1 else "failed runs"))
-    notes = [note for records in campaigns.values() for note in records.notes]
+    notes = [note for records in campaigns.values() for note in (*records.notes, *_told_besides(records))]
     sources = {row["versions"]["source"] for records in campaigns.values() for row in records.done.values()}
     if len(sources) > 1:
         notes.append(
@@ -111,10 +111,31 @@ def campaign_report(campaigns: dict[str, Records], *, illustrated: bool = True) 
     return CampaignReport("Campaigns", _headline(campaigns), tuple(facts), tuple(sections), scenes, tuple(notes))
 
 
+def _shown(records: Records, rows: Mapping[tuple[str, str, int], Any]) -> int:
+    """Return how many of the rows are of problems and methods that the plan has."""
+    cells = records.cells
+    return sum((problem, method) in cells for problem, method, _ in rows)
+
+
+def _told_besides(records: Records) -> list[str]:
+    """Return what the tables of a campaign cannot show."""
+    title, notes = records.header["title"], []
+    left = len(records.rows) - _shown(records, records.rows)
+    if left:
+        notes.append(f"{title}: {amount(left, 'run')} of problems or methods that the plan no longer has; not shown.")
+    lost = [row["failed_requeries"] for row in records.done.values() if "failed_requeries" in row]
+    if lost:
+        notes.append(
+            f"{title}: the answers of {amount(len(lost), 'run')} gave no value in some re-queries ({max(lost)} at "
+            "most); each of these counts as the lowest value that its run met."
+        )
+    return notes
+
+
 def _headline(campaigns: dict[str, Records]) -> str:
     told = [r for r in claim_results(campaigns) if r.verdict not in ("no runs", "too few runs")]
     if not told:
-        runs = sum(len(records.done) for records in campaigns.values())
+        runs = sum(_shown(records, records.done) for records in campaigns.values())
         return f"{amount(len(campaigns), 'campaign')}, {amount(runs, 'run')}."
     count = {word: sum(result.verdict == word for result in told) for word in ("holds", "not shown", "contradicted")}
     return (

@@ -35,7 +35,8 @@ def run_once(cell: Cell, seed: int) -> dict[str, Any]:
     """Make one run and return its row, JSON-ready; an error becomes the row of a failed run.
 
     Fields of a finished run, traces as changes by iteration: `best` (highest value told), `value` (true value of the
-    answer, where it is another), `mean`, `worst`, `std` (of the answer re-queried under the input noise), `regret`
+    answer, where it is another), `mean`, `worst`, `std` (of the answer re-queried under the input noise; a re-query
+    that gives no value counts as the lowest of the run, `failed_requeries` is their number at the end), `regret`
     (under the own noise of a robust problem), `leaves` (of the tree); `first_split` (trials told when the tree first
     split, or null), `x` (the answer, unit cube), `expectation` (its exact mean under the noise, where that is known),
     `failed_trials`, `ask_seconds` (CPU, a trial).
@@ -72,6 +73,7 @@ class _Run:
         self.leaves: list[float] = []
         self.ask_seconds: list[float] = []
         self._scores: dict[bytes, tuple[float, float, float]] = {}
+        self._without_value: dict[bytes, int] = {}
         self._regrets: dict[bytes, float] = {}
 
     def finish(self) -> dict[str, Any]:
@@ -123,7 +125,11 @@ class _Run:
         if key not in self._scores:
             x = self.problem.box.from_unit(u)
             score = robust_score(self.problem, x, self.noise, self.cell.on.requeries, self.seed)
+            self._without_value[key] = score.n_failed
             self._scores[key] = (score.mean, score.worst, score.std)
+            if score.n_failed:  # leaving them out would praise an answer for failing where its values are low
+                values = np.append(score.values, np.full(score.n_failed, np.nanmin(self.true)))
+                self._scores[key] = float(values.mean()), float(values.min()), float(values.std(ddof=1))
         return self._scores[key]
 
     def _regret(self, u: NDArray[np.float64] | None) -> float:
@@ -161,6 +167,8 @@ class _Run:
             row["value"] = value
         if self.noise is not None:
             row |= {name: changes(scores[:, i]) for i, name in enumerate(_ROBUST)}
+            if answer is not None and (lost := self._without_value[answer.tobytes()]):
+                row["failed_requeries"] = lost
         if self.asked is not None:
             row["regret"] = changes([self._regret(u) for u in self.answers])
         if self._treed:

@@ -40,6 +40,18 @@ class Records:
     """what was dropped"""
 
     @property
+    def runs(self) -> int:
+        """Seeds of each problem and method: the plan's, or as many as were made beyond them."""
+        cells = self.cells
+        made = [seed + 1 for problem, method, seed in self.done if (problem, method) in cells]
+        return max([self.header["runs"], *made])
+
+    @property
+    def cells(self) -> set[tuple[str, str]]:
+        """Problems and methods of the plan; the tables may hold runs of others, which it had before."""
+        return {(cell["problem"], cell["method"]) for cell in self.header["cells"]}
+
+    @property
     def done(self) -> dict[Key, dict[str, Any]]:
         """Rows of the runs that finished."""
         return {key: row for key, row in self.rows.items() if row["status"] == "done"}
@@ -141,6 +153,9 @@ def opened(folder: str | Path, plan: Plan, shard: tuple[int, int] = (1, 1)) -> I
             )
         _same_settings(place, plan, records)
         records.header = header
+        first, _, rows = path.read_bytes().partition(b"\n")
+        if first + b"\n" != _line(header):  # a plan that has grown: its page shows it although the run is interrupted
+            write_file(path, _line(header) + rows)
         yield Table(path, records)
 
 
