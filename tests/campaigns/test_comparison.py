@@ -243,3 +243,14 @@ def test_claims_and_open_places_fill_their_tables():
     records = {"table-4.1": records_of("table-4.1", 100, {("RKHS", "GP"): [1.0]})}
     assert len(claims_table(records).rows) == sum(claim.plan == "table-4.1" for claim in CLAIMS)
     assert len(open_places_table().rows) == len(OPEN_PLACES) > 10
+
+
+def test_a_method_that_mostly_gains_and_loses_more_by_the_mean_is_not_called_better():
+    few = np.full(3, -5.0)  # of 30 seeds three end in a disaster
+    gains = np.concatenate([0.1 + 0.01 * np.arange(27), few])
+    records = records_of("mine", 30, {("a", "first"): np.ones(30).tolist(), ("a", "second"): (1.0 + gains).tolist()})
+    (told,) = comparisons(records)
+    assert stats.wilcoxon(gains).pvalue < 0.05
+    assert told.p < 0.05
+    assert told.difference.mean < 0.0 < told.difference.r
+    assert told.verdict == "no difference shown"

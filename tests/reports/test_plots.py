@@ -98,6 +98,7 @@ def test_boxes_of_many_kinds_are_drawn(tmp_path):
     )
     report = result_report(mixed, lambda p: abs(np.log(p["force"])) + (p["grip"] == "pinch"))
     assert report.choices["grip"][report.recommended.trial] == "power"
+    assert "trials, projected" in figures(report)["surface"].axes[0].get_legend_handles_labels()[1]
     assert report.recommended.mean < 0.2
     force, grip = mixed.optimizer.plot_slice({"force": 1.0, "grip": "power"}).axes
     assert force.get_xscale() == "log"

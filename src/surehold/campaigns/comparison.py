@@ -221,8 +221,8 @@ def least_of(records: Records, problem: str) -> float:
 
 
 def _word(difference: Paired, p: float, measure: str, least: float) -> str:
-    if not p < LEVEL or difference.r == 0.0:
-        return "no difference shown"
+    if not p < LEVEL or difference.r * difference.mean <= 0.0:  # most seeds gain, but a few lose more than that, or
+        return "no difference shown"  # the other way round: ranks and mean do not say the same
     if abs(difference.mean) < least:
         return "no difference of interest"
     return "better" if (difference.r > 0.0) != (measure in LOWER) else "worse"

@@ -182,7 +182,10 @@ def _test_table(records: Records, tests: list[Comparison]) -> Table:
             )
         )
         marks.append(_MARKS[test.verdict])
-    note = "Wilcoxon's signed-rank test on common seeds, Holm-adjusted; r: matched-pairs rank-biserial correlation."
+    note = (
+        f"Difference: the method's value minus that of '{reference}'. Wilcoxon's signed-rank test on common seeds, "
+        "Holm-adjusted; r: matched-pairs rank-biserial correlation."
+    )
     return Table(
         f"{records.header['plan']}-tests",
         f"Beside {reference}, on common seeds",

@@ -210,7 +210,8 @@ def draw_line(axes: "Axes", report: RunReport, view: Surface) -> None:
         axes.plot(t, view.robust_mean, color=PALETTE["answer"], linewidth=2.0, label="averaged over the input noise")
     marks = marked(report, view)
     ok, failed = marks["trials-told"], marks["trials-without-value"]
-    told = {"s": 12, "color": PALETTE["muted"], "gid": "trials-told", "label": "trials", "zorder": 2.5}
+    name = "trials, projected" if len(report.variables) > 1 or report.choices else "trials"  # a slice passes them by
+    told = {"s": 12, "color": PALETTE["muted"], "gid": "trials-told", "label": name, "zorder": 2.5}
     axes.scatter(variable.shown(report.X[ok, i]), report.y[ok], **told)
     for candidate in report.candidates:
         role = _role(report, candidate)
