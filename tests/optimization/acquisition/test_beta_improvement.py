@@ -21,7 +21,10 @@ def posterior():
 
 
 def perturbations(kind):
-    noise = None if kind == "exact" else InputNoise.unit(0.08)
+    if kind == "varying":
+        noise = InputNoise.varying(lambda x: np.array([0.02 + 0.2 * x[0], 0.05 + 0.1 * x[1]]))
+    else:
+        noise = None if kind == "exact" else InputNoise.unit(0.08)
     return Perturbations.of(noise, BOX, "unscented", "clip" if kind == "clip" else "extend")
 
 
@@ -34,7 +37,7 @@ def test_expected_improvement_by_quadrature(alpha, beta, best):
     assert found == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["exact", "extend", "clip"])
+@pytest.mark.parametrize("kind", ["exact", "extend", "clip", "varying"])
 def test_gradient_by_differences(kind):
     criterion = BetaImprovement(posterior(), perturbations(kind), 0.7)
     U = np.array([[0.31, 0.42], [0.83, 0.2], [0.97, 0.55]])

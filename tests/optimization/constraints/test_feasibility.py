@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from scipy.optimize import check_grad
+from scipy.optimize import approx_fprime, check_grad
 from scipy.special import log_ndtr, ndtr
 
 from surehold.optimization.box import Box
@@ -52,6 +52,14 @@ def test_gradients_by_differences():
             lambda v: noisy.log_probability(v[None])[0][0], lambda v: noisy.log_probability(v[None], True)[1][0], u
         )
         assert error < 1e-4
+
+
+def test_gradients_under_noise_that_varies():
+    noise = InputNoise.varying(lambda x: np.array([0.02 + 0.2 * x[0], 0.05 + 0.1 * x[1]]))
+    requirement = Succeeds(SuccessModel(X, OK), Perturbations.of(noise, Box.unit(2), "unscented"), 2.0)
+    for u in np.array([[0.5, 0.4], [0.3, 0.7], [0.62, 0.55]]):
+        slope = approx_fprime(u, lambda v: requirement.log_probability(v[None])[0][0], 1e-6)
+        np.testing.assert_allclose(requirement.log_probability(u[None], gradient=True)[1][0], slope, rtol=1e-3)
 
 
 def test_what_is_said_to_be_likely_is_so_at_least_as_often():

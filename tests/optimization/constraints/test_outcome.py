@@ -1,7 +1,7 @@
 import mpmath
 import numpy as np
 import pytest
-from scipy.optimize import check_grad
+from scipy.optimize import approx_fprime, check_grad
 from scipy.stats import norm
 
 from surehold.optimization.box import Box
@@ -80,6 +80,15 @@ def test_gradients_by_differences(posterior, limit, noisy):
         )
         scale = 1.0 + np.abs(within.log_probability(u[None], True)[1]).max()
         assert error < 1e-4 * scale
+
+
+def test_gradients_under_noise_that_varies(posterior):
+    noise = InputNoise.varying(lambda x: np.array([0.02 + 0.2 * x[0], 0.05 + 0.1 * x[1]]))
+    perturbations = Perturbations.of(noise, Box.unit(2), "quasi_monte_carlo")
+    requirement = Within(posterior, Limit("c", 0.8, 2.2), perturbations, norm.ppf(0.9))
+    for u in np.random.default_rng(3).random((4, 2)):
+        slope = approx_fprime(u, lambda v: requirement.log_probability(v[None])[0][0], 1e-6)
+        np.testing.assert_allclose(requirement.log_probability(u[None], gradient=True)[1][0], slope, rtol=1e-3)
 
 
 def test_under_noise_the_share_of_executions_of_a_linear_output():

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import betaincc
 
 from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.numerics.differences import by_differences
 from surehold.optimization.surrogates.protocol import Posterior, mixture
 
 __all__ = ["BetaImprovement", "beta_improvement"]
@@ -46,6 +47,8 @@ class BetaImprovement:
 
     def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the values (q,) and their gradients (q, d) at U (q, d)."""
+        if self._perturbations.unknown_slopes:
+            return by_differences(self, U)
         moments = self._perturbations.outcome(self._posterior, U, gradient=True)
         if moments.mean_gradient is None or moments.variance_gradient is None:
             raise ValueError("moments came without gradients")

@@ -109,7 +109,7 @@ class Acquisition:
 
     def with_gradient(self, U: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the values (q,) and their gradients (q, d) at points U (q, d)."""
-        if self._perturbations.root is not None or self._perturbations.allowed is not None:  # a user's function
+        if self._perturbations.unknown_slopes:
             return by_differences(self, U)
         return self._evaluate(U, True)
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from surehold.defaults import FAILURE_LENGTHS, FAILURE_SIGNALS
 from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.numerics.differences import by_differences
 from surehold.optimization.surrogates.gaussian_process.kernels import kernel_number
 from surehold.optimization.surrogates.success.model import counted
 from surehold.optimization.surrogates.success.posterior import SuccessPosterior, sites_of
@@ -68,6 +69,8 @@ class Succeeds:
         self, U: NDArray[np.float64], gradient: bool = False
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the logarithm of the probability (q,) at U (q, d), and its gradients (q, d) where asked for."""
+        if gradient and self._perturbations.unknown_slopes:
+            return by_differences(lambda V: self.log_probability(V)[0], U)
         q, d = U.shape
         weights = self._perturbations.quadrature.weights
         points, free = self._perturbations.with_slopes(U)

@@ -23,6 +23,7 @@ from scipy.special import log_ndtr, logsumexp, ndtr
 
 from surehold.optimization.limits import Limit
 from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.numerics.differences import by_differences
 from surehold.optimization.surrogates.protocol import Posterior
 
 __all__ = ["Within", "execution_probability", "interval", "log_interval"]
@@ -45,6 +46,8 @@ class Within:
         self, U: NDArray[np.float64], gradient: bool = False
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the logarithm of the probability (q,) at U (q, d), and its gradients (q, d) where asked for."""
+        if gradient and self._perturbations.unknown_slopes:
+            return by_differences(lambda V: self.log_probability(V)[0], U)
         q, d = U.shape
         moments = self._perturbations.outcome(self._posterior, U, gradient)
         mean, variance = moments.mean, np.maximum(moments.variance, 1e-290)

@@ -106,6 +106,11 @@ class Perturbations:
         points, root = noise.kind.quadrature(box, rule, k, exponent)
         return cls(points, border, root, allowed=allowed)
 
+    @property
+    def unknown_slopes(self) -> bool:
+        """Whether a user's function of the query moves the points, so that gradients by the query leave that out."""
+        return self.root is not None or self.allowed is not None
+
     def around(self, U: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the perturbed points (q, s, d) of U (q, d)."""
         offsets, _ = self._at(U)
