@@ -122,6 +122,6 @@ def described(
     """Return the recommendation with what is known of the share of executions that succeed at u (d,)."""
     from surehold.optimization.surrogates.success.posterior import shares
 
-    draws = shares(posterior, reached.around(u[None, :])[0])
+    draws = shares(posterior, reached.around(u[None, :])[0], reached.quadrature.weights)
     share = Outcome(draws, np.zeros(len(draws)))
     return replace(answer, expectation=share, quantile=share.quantile(0.05), refused="")

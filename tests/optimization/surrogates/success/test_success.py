@@ -9,7 +9,7 @@ from surehold.optimization.surrogates.gaussian_process.kernels import correlatio
 from surehold.optimization.surrogates.success import model
 from surehold.optimization.surrogates.success.laplace import Counts, laplace, log_posterior, prior_covariance
 from surehold.optimization.surrogates.success.model import SuccessProcess
-from surehold.optimization.surrogates.success.posterior import probability
+from surehold.optimization.surrogates.success.posterior import probability, shares
 from surehold.optimization.surrogates.success.propagation import propagated
 
 L, S2 = np.array([0.3, 0.5]), 1.5
@@ -252,3 +252,10 @@ def test_probabilities_near_those_of_the_logistic_classifier():
     difference = ours - theirs.predict_proba(queries)[:, 1]
     assert np.abs(difference).max() < 0.05
     assert np.abs(difference).mean() < 0.02
+
+
+def test_shares_of_success_over_points_of_unequal_weight():
+    posterior = fixed(*data())
+    points, weights = np.array([[0.5, 0.5], [0.05, 0.95], [0.9, 0.1]]), np.array([0.7, 0.2, 0.1])
+    expected = posterior.moments(points).mean.mean(axis=0) @ weights
+    assert shares(posterior, points, weights).mean() == pytest.approx(expected, abs=0.005)

@@ -184,9 +184,9 @@ def probability(
     return mean, variance, (by_mu, by_v, second_by_mu - 2.0 * mean * by_mu, second_by_v - 2.0 * mean * by_v)
 
 
-def shares(posterior: Posterior, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return draws of the mean of P over equally weighted points (s, d), those of all particles together."""
-    return posterior.sample(points[None], _normals(len(points))).mean(axis=-1).ravel()
+def shares(posterior: Posterior, points: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return draws of the mean of P over points (s, d) with weights (s,), those of all particles together."""
+    return (posterior.sample(points[None], _normals(len(points))) @ weights).ravel()
 
 
 def _normals(s: int) -> NDArray[np.float64]:
