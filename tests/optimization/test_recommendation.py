@@ -195,6 +195,24 @@ def test_the_stated_mean_is_as_sure_as_its_average():
     assert best.expectation.std < 3e-3
 
 
+@pytest.mark.parametrize("border", ["extend", "clip", "keep"])
+def test_the_risk_left_to_take_is_the_spread_of_the_mean_over_executions(border):
+    """Beside a border some executions are held: three sigma points, one of which is, misjudge the others."""
+    noise = sh.InputNoise.uniform({"x": 0.5})
+    optimizer = sh.Optimizer(LINE, input_noise=noise, border=border, seed=0)
+    X = np.linspace(-1.0, 1.0, 25)[:, None]
+    optimizer.restore(X, X[:, 0] ** 3)
+    best = optimizer.recommend()
+    points = best.x[0] + stats.uniform(-0.5, 1.0).ppf((np.arange(4000) + 0.5) / 4000)
+    inside = np.abs(points) <= 1.0
+    points = {
+        "extend": points,
+        "clip": np.clip(points, -1.0, 1.0),
+        "keep": np.where(inside, points, best.x[0]),
+    }[border]
+    assert best.outcome_std == pytest.approx(np.std(optimizer.predict(points[:, None])[0]), rel=0.02)
+
+
 def test_a_place_that_is_worth_as_much_is_no_worse():
     found = sh.maximize(
         lambda x: x[0] + x[1],

@@ -347,7 +347,6 @@ class Optimizer(Record):
                 posterior,
                 reached,
                 finer,
-                ranking.coarse,
                 u,
                 self.box,
                 observed,

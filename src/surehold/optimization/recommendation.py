@@ -108,7 +108,7 @@ class Recommendation:
     n
         Trials with a value that the recommendation rests on.
     outcome_std
-        Standard deviation, over the input noise, of the model's mean: the risk left to take; unscented variance (4.1).
+        Standard deviation, over the input noise, of the model's mean: the risk left to take.
     refused
         Why the best observed trial was not recommended; empty where it was.
     warning
@@ -252,7 +252,6 @@ def recommendation(
     posterior: Posterior,
     reached: Perturbations,
     finer: Perturbations | None,
-    sigma_points: Perturbations,
     u: NDArray[np.float64],
     box: Box,
     observed: float,
@@ -274,11 +273,7 @@ def recommendation(
     """
     outcome = execution_at(posterior, reached, u, noise_variance)
     expectation = expectation_at(posterior, reached, u, finer)
-    moments, _ = sigma_points.spread(posterior, u[None, :])
-    near, weights = moments.mean.mean(axis=0), sigma_points.quadrature.weights
-    spread = near - weights @ near
-    unit = float(np.abs(spread).max()) or 1.0  # squares may overflow
-    variance = weights @ (spread / unit) ** 2
+    near, weights = outcome.means.reshape(-1, len(reached.quadrature.weights)).mean(axis=0), reached.quadrature.weights
     refused = ""
 
     def said(value: float) -> str:
@@ -314,7 +309,7 @@ def recommendation(
         sign * outcome.quantile(_LEVEL),
         sign * observed,
         n,
-        unit * float(np.sqrt(max(variance, 0.0))),
+        Outcome(near, np.zeros(len(near)), weights).std,
         refused,
         warning,
         outliers,
