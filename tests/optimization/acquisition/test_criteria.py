@@ -73,6 +73,15 @@ def test_no_spread():
     assert probability_of_improvement([1.0, -1.0], 0.0, 0.0).value.tolist() == [1.0, 0.0]
 
 
+@pytest.mark.parametrize("std", [1e-7, 1e-9, 1e-20, 0.0])
+def test_log_improvement_of_a_sure_gain_is_the_logarithm_of_the_gain(std):
+    for gain in (2.0, 0.003):
+        value, by_mean, by_std = log_expected_improvement(gain, std, 0.0)
+        assert float(value) == pytest.approx(np.log(gain), rel=1e-12)
+        assert float(by_mean) == pytest.approx(1.0 / gain, rel=1e-12)
+        assert abs(by_std) < 1e-7 / gain
+
+
 @given(st.floats(-1e6, 1e6), st.floats(0.0, 1e6), st.floats(-1e6, 1e6), st.floats(0.0, 10.0))
 def test_always_numbers_and_ordered(mean, std, best, more):
     for criterion in (expected_improvement, log_expected_improvement, probability_of_improvement):

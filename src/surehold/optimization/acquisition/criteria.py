@@ -113,7 +113,7 @@ def _fill_improvement(gain, std, value, by_mean, by_std):
 @njit(cache=True)
 def _fill_log_improvement(gain, std, value, by_mean, by_std):
     for i in range(gain.size):
-        s = max(std[i], _SMALLEST)
+        s = max(std[i], _SMALLEST, gain[i] / _FARTHEST)  # of a gain that is as good as sure, the logarithm is of it
         z = gain[i] / max(s, abs(gain[i]) / _FARTHEST)
         if z < -1.0:
             k = _continued_fraction(-z)
