@@ -19,7 +19,7 @@ from surehold.studies.robot import RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
 from surehold.studies.status import rows, status
-from surehold.studies.storage import open_storage
+from surehold.studies.storage import StorageFailure, open_storage
 
 SETTINGS = StudySettings(SearchSpace({"x": (0.0, 1.0)}), optimizer={"n_initial": 4})
 
@@ -230,7 +230,7 @@ def test_the_tables_of_a_database_are_made_under_a_lock(tmp_path):
 
 HOLDING = """
 import sys, time
-from surehold.studies.storage import open_storage
+from surehold.studies.storage import StorageFailure, open_storage
 with open_storage(sys.argv[1], "mug", create=True).handing_out():
     print("held", flush=True)
     time.sleep(3600)
@@ -278,3 +278,65 @@ def as_the_dashboard_reads(backend, number):
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     return module.get_note_from_system_attrs(backend.get_study_system_attrs(number), None)["body"]
+
+
+@pytest.mark.parametrize("how", ["an older copy", "an older copy in its place", "a new study", "nothing"])
+@pytest.mark.parametrize("file", ["journal.log", "a.db"])
+def test_a_file_that_was_replaced_is_found_out(file, how, tmp_path):
+    """Answers were taken and lost, or went to the trials of another study."""
+    path = tmp_path / file
+    url = str(path) if file == "journal.log" else f"sqlite:///{path}"
+    robot = RobotStudy.create("mug", SETTINGS, url)
+    robot.tell(robot.ask().id, 0.5)
+    older = path.read_bytes()
+    asked = [robot.ask(f"arm {k}").id for k in range(2)]
+    newer = path.read_bytes()
+    if how == "an older copy in its place":
+        path.write_bytes(older)
+    else:
+        path.unlink()
+    if how == "an older copy":
+        path.write_bytes(older)
+    elif how == "a new study":
+        again = RobotStudy.create("mug", SETTINGS, url)
+        others = [again.ask(f"leg {k}").id for k in range(4)]
+        assert set(asked) < set(others)
+    there = path.read_bytes() if path.exists() else b""
+    for attempt in (lambda: robot.tell(asked[0], 9.0), lambda: robot.veto(asked[1])):
+        with pytest.raises(StorageFailure, match=r"start the program again|No such file"):
+            attempt()
+    if file == "journal.log":
+        for look in (lambda: robot.paused, lambda: status(robot), lambda: robot.stop_rule):
+            with pytest.raises(StorageFailure, match=r"start the program again|No such file"):
+                look()
+    assert (path.read_bytes() if path.exists() else b"") == there
+    if file == "journal.log":
+        path.write_bytes(newer)
+        assert robot.tell(asked[0], 9.0).already is False
+    robot.close()
+
+
+def test_a_journal_that_another_program_goes_on_with_is_read_on(tmp_path):
+    path = tmp_path / "journal.log"
+    robot = RobotStudy.create("mug", SETTINGS, str(path))
+    robot.ask()
+    path.with_suffix(".copy").write_bytes(path.read_bytes())
+    os.replace(path.with_suffix(".copy"), path)  # the same, as rsync does it
+    other = RobotStudy.open("mug", str(path))
+    other.tell(other.ask().id, 0.5)
+    assert [t.value for t in robot.trials()] == [None, 0.5]
+    assert robot.ask().id == 2
+
+
+@pytest.mark.parametrize("file", ["journal.log", "sqlite:///a.db"])
+def test_a_study_that_was_deleted_is_said_to_be_gone(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    robot = RobotStudy.create("mug", SETTINGS, file)
+    asked = robot.ask()
+    other = RobotStudy.open("mug", file)
+    optuna.delete_study(study_name="mug", storage=other.storage.backend)  # as optuna-dashboard does
+    for attempt in (lambda: robot.tell(asked.id, 0.5), robot.ask, lambda: status(robot), robot.recommend):
+        with pytest.raises(StorageFailure, match="lacks the study, or a trial"):
+            attempt()
+    robot.close()
+    other.close()

@@ -1,56 +1,101 @@
-"""A journal file of Optuna, mended before it is read: one line an operation, the last one perhaps half written."""
+"""A journal file of Optuna, one operation a line: its damaged end is mended, and a file put in its place found out."""
 
+import errno
 import json
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
 from optuna import logging
-from optuna.storages.journal import BaseJournalBackend, JournalFileBackend
+from optuna.storages.journal import BaseJournalBackend
 
 from surehold.store.locks import file_lock
 
-__all__ = ["Journal"]
+__all__ = ["REPLACED", "Journal"]
 
+#: What is said where the file of a storage is not the one that was opened.
+REPLACED: Final = (
+    "it is another file, or shorter, than the one that this program has read, and what the program knows is not in it; "
+    "put the former file back, or start the program again"
+)
 _log: Final = logging.get_logger(__name__)
 
 
-class _JournalLock:
-    """The lock of a journal's writers, in the form that Optuna asks for.
+class Journal(BaseJournalBackend):
+    """A journal file as Optuna writes and reads it.
 
-    Optuna's own locks are files that outlive a killed process; others then wait half a minute. A writer that was killed
-    or ran out of disk in the middle of a line, or a power cut, leaves a line behind that cannot be read; one more line
-    behind it would make the whole journal unreadable. So it is cut off before anything is appended, and said.
+    A writer that was killed or ran out of disk in the middle of a line, or a power cut, leaves a line behind that
+    cannot be read; one more line behind it would make the whole journal unreadable. So it is cut off before anything is
+    read or appended, and said.
+
+    Trials are known by how many lines before began one. Where the file was replaced by a copy, or by a new study, since
+    this process read it, its answers would be lost or go to other trials: reading and appending then raise OSError.
+
+    The lock is the operating system's: Optuna's own ones are files that outlive a killed process, for which others then
+    wait half a minute.
     """
 
-    def __init__(self, journal: Path):
-        self._journal = journal
-        self._lock = file_lock(journal.with_name(f"{journal.name}.lock"))
+    def __init__(self, path: Path):
+        self._path = path
+        self._lock = file_lock(path.with_name(f"{path.name}.lock"))
+        self._forget()
 
-    def acquire(self) -> bool:
-        self._lock.acquire()
-        try:
+    def _forget(self) -> None:
+        self._number, self._end, self._last = 0, 0, b""  # lines read, where they end, and the last of them
+
+    def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
+        """Yield the operations from that number on; see Optuna."""
+        self._mend_end()
+        if log_number_from != self._number:
+            self._forget()
+        with open(self._path, "rb") as journal:
+            self._check(journal)
+            for line in journal:
+                if not line.endswith(b"\n"):  # it is just being written
+                    return
+                operation = json.loads(line)
+                self._number, self._end, self._last = self._number + 1, self._end + len(line), line
+                if self._number > log_number_from:
+                    yield operation
+
+    def append_logs(self, logs: list[dict[str, Any]]) -> None:
+        """Append operations; see Optuna."""
+        lines = "".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs)
+        with self._locked(), open(self._path, "rb+") as journal:
+            self._check(journal)
+            journal.seek(0, os.SEEK_END)
+            journal.write(lines.encode("utf-8"))
+            journal.flush()
+            os.fsync(journal.fileno())
+
+    def _check(self, journal: BinaryIO) -> None:
+        """Go to the end of what was read; raises OSError where the last line of that is not there any more."""
+        journal.seek(self._end - len(self._last))
+        if journal.read(len(self._last)) != self._last:
+            raise OSError(errno.ESTALE, REPLACED)
+
+    # --- a damaged end --------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Hold the lock of the writers during the block, behind whole lines."""
+        with self._lock:
             self._mend()
-        except BaseException:
-            self._lock.release()
-            raise
-        return True
+            yield
 
-    def release(self) -> None:
-        self._lock.release()
-
-    def mend(self) -> None:
+    def _mend_end(self) -> None:
         """Cut off a damaged last line, if there is one; a line that is just being written is waited for."""
-        with open(self._journal, "rb") as journal:
+        with open(self._path, "rb") as journal:
             end = journal.seek(0, os.SEEK_END)
             whole = not end or _is_operation(_line_before(journal, end))
         if not whole:
-            self.acquire()
-            self.release()
+            with self._locked():
+                pass
 
     def _mend(self) -> None:
-        with open(self._journal, "rb+") as journal:
+        with open(self._path, "rb+") as journal:
             size = end = journal.seek(0, os.SEEK_END)
             last = b""
             while end and not _is_operation(last := _line_before(journal, end)):
@@ -60,24 +105,7 @@ class _JournalLock:
             journal.seek(end)
             lost = journal.read(100)
             journal.truncate(end)
-        _log.warning(f"{self._journal}: damaged last line cut off, {size - end} bytes that start with {lost!r}.")
-
-
-class Journal(BaseJournalBackend):
-    """A journal file that is mended before it is read: not every kind of damage is passed over by Optuna's reader."""
-
-    def __init__(self, path: Path):
-        self._lock = _JournalLock(path)
-        self._file = JournalFileBackend(str(path), lock_obj=self._lock)  # type: ignore[arg-type]
-
-    def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
-        """Return the operations from that number on; see Optuna."""
-        self._lock.mend()
-        return self._file.read_logs(log_number_from)
-
-    def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        """Append operations; see Optuna."""
-        self._file.append_logs(logs)
+        _log.warning(f"{self._path}: damaged last line cut off, {size - end} bytes that start with {lost!r}.")
 
 
 def _line_before(file: BinaryIO, end: int) -> bytes:

@@ -140,12 +140,14 @@ class OpenedStudy:
     @property
     def paused(self) -> str | None:
         """Why the study is paused; None where it is not."""
-        return self.study.user_attrs.get(_PAUSED)
+        with self.storage.failures():
+            return self.study.user_attrs.get(_PAUSED)
 
     @property
     def stop_rule(self) -> StopRule:
         """When asking ends."""
-        return StopRule.from_dict(self.study.user_attrs.get(_STOP))
+        with self.storage.failures():
+            return StopRule.from_dict(self.study.user_attrs.get(_STOP))
 
     def set_stop_rule(self, rule: StopRule) -> None:
         """Store when asking ends; `StopRule()` never."""

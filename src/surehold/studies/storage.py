@@ -24,9 +24,10 @@ from urllib.parse import quote
 
 from optuna.exceptions import DuplicatedStudyError, StorageInternalError
 from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, get_storage
+from optuna.storages.journal._storage import NOT_FOUND_MSG
 
 from surehold.errors import InputError
-from surehold.studies.journal import Journal
+from surehold.studies.journal import REPLACED, Journal
 from surehold.studies.study_lock import StudyLock
 
 __all__ = ["JOURNAL", "Storage", "StorageFailure", "checked_name", "open_storage"]
@@ -61,18 +62,31 @@ class Storage:
         self.url: Final = url
         self.shown: Final = _without_password(url)
         self._engine = engine
+        self._database = beside if engine is not None else None
+        self._identity = _identity(self._database)
         self._asking, self._telling = (
             StudyLock(key, None if beside is None else beside.with_name(beside.name + ending), engine)
             for key, ending in ((f"surehold:{name}", ".asking"), (f"surehold answers:{name}", _TELLING))
         )
 
-    def handing_out(self) -> AbstractContextManager[None]:
+    @contextmanager
+    def handing_out(self) -> Iterator[None]:
         """Hold the lock under which trials are handed out; only one thread of all processes does at a time."""
-        return self._asking.held()
+        with self._asking.held():
+            self._check_database()
+            yield
 
-    def answering(self) -> AbstractContextManager[None]:
+    @contextmanager
+    def answering(self) -> Iterator[None]:
         """Hold the lock under which a trial is looked at and then changed; within `handing_out`, not around it."""
-        return self._telling.held()
+        with self._telling.held():
+            self._check_database()
+            yield
+
+    def _check_database(self) -> None:
+        """Raise OSError where another file is in the place of the database: what is written would go to either."""
+        if _identity(self._database) != self._identity:
+            raise OSError(errno.ESTALE, REPLACED)
 
     @contextmanager
     def failures(self) -> Iterator[None]:
@@ -88,6 +102,13 @@ class Storage:
         except OSError as error:
             hint = "; copy it to a place that can be written" if error.errno in _READ_ONLY else ""
             raise StorageFailure(f"storage {self.shown} cannot be used: {error.strerror or error}{hint}.") from error
+        except KeyError as error:
+            if error.args != (NOT_FOUND_MSG,):  # in Optuna's words: deleted by its dashboard, or an older copy is there
+                raise
+            raise StorageFailure(
+                f"storage {self.shown} lacks the study, or a trial, that was in it when this program opened it; put "
+                "the former storage back, or start the program again."
+            ) from error
         except DuplicatedStudyError:
             raise InputError(f"the study exists in {self.shown} already; use it, or choose another name.") from None
 
@@ -179,6 +200,15 @@ def _journal(path: Path, name: str, create: bool) -> Storage:
 
 
 # --- databases ----------------------------------------------------------------------------------------------------
+
+
+def _identity(path: Path | None) -> tuple[int, int] | None:
+    """Return what tells a file from all others, None where there is none."""
+    try:
+        found = None if path is None else path.stat()
+    except OSError:
+        return None
+    return None if found is None else (found.st_dev, found.st_ino)
 
 
 def _sqlite(url: str, name: str, create: bool) -> Storage:
