@@ -75,7 +75,7 @@ def test_storages_without_permission(tmp_path):
 
 
 @pytest.mark.parametrize("url", ["{}/journal.log", "sqlite:///{}/a b%20.db"])
-def test_what_cannot_be_written_is_read(url, tmp_path, monkeypatch):
+def test_what_cannot_be_written_is_read(url, tmp_path, monkeypatch, caplog):
     """A copy on a medium that is mounted for reading; the tests may run as root, who writes everywhere."""
     url = url.format(tmp_path)
     robot = RobotStudy.create("mug", SETTINGS, url)
@@ -99,6 +99,9 @@ def test_what_cannot_be_written_is_read(url, tmp_path, monkeypatch):
     monkeypatch.setattr(FileLock, "acquire", lambda *_, **__: read_only("", "ab"))
     with pytest.raises(InputError, match="Read-only file system; copy it to a place that can be written"):
         copy.ask()
+    caplog.clear()
+    assert copy.recommend() == copy.recommend(write=False)
+    assert "The answer is not noted in study 'mug': storage" in caplog.text
     with pytest.raises(InputError, match="cannot be written: Read-only file system"):
         RobotStudy.create("other", SETTINGS, url)
     copy.close()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
+from optuna import logging
 from optuna.trial import FrozenTrial, TrialState
 
 from surehold.errors import InputError, SureholdError, unknown_name
@@ -18,10 +19,13 @@ from surehold.optimization.limits import checked_outputs
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
 from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Told, checked_value, holder_of, waits
 from surehold.studies.opened import OpenedStudy
-from surehold.studies.recommendation import StudyRecommendation, find_recommendation, recommend, written
+from surehold.studies.recommendation import StudyRecommendation, find_recommendation, written
+from surehold.studies.storage import StorageFailure
 from surehold.studies.success import answer
 
 __all__ = ["Asked", "NothingToAsk", "RobotStudy"]
+
+_log: Final = logging.get_logger(__name__)
 
 Proposals = Callable[[list[FrozenTrial]], tuple[dict[str, Any], int] | None]
 
@@ -242,12 +246,22 @@ class RobotStudy(OpenedStudy):
     # --- looking --------------------------------------------------------------------------------------------------
 
     def recommend(self, *, write: bool = True) -> StudyRecommendation:
-        """Return the safe answer, and write it into the study; see `surehold.studies.recommend`."""
+        """Return the safe answer, and write it into the study; see `surehold.studies.recommend`.
+
+        Where the storage cannot be written (a copy on a medium for reading, a full disk) that is said, no more.
+        """
         with self.storage.failures():
             if self._touched is not None:
                 found = self._touched.recommend(self._ledger.trials(), self.settings.space)
-                return written(self.study, found) if write else found
-            return (recommend if write else find_recommendation)(self.study, self.sampler)
+            else:
+                found = find_recommendation(self.study, self.sampler)
+        if write:
+            try:
+                with self.storage.failures():
+                    written(self.study, found)
+            except StorageFailure as failure:
+                _log.warning(f"The answer is not noted in study '{self.name}': {failure}")
+        return found
 
     def trials(self) -> list[FrozenTrial]:
         """Return all trials as Optuna stores them, by number; not to be changed."""
