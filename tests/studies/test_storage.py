@@ -105,6 +105,10 @@ def test_what_cannot_be_written_is_read(url, tmp_path, monkeypatch, caplog):
     with pytest.raises(InputError, match="cannot be written: Read-only file system"):
         RobotStudy.create("other", SETTINGS, url)
     copy.close()
+    if not url.startswith("sqlite"):
+        with open(url, "ab") as journal:
+            journal.write(b'{"op_code":4,"worker')  # copied while it was written
+        assert [row["value"] for row in rows(RobotStudy.open("mug", url))] == [0.5]
 
 
 @pytest.mark.parametrize("text", ["hello", "hello\n", '{"op_code": 99}\n', '{"op_code": 0}\n', "[1]", "\0\0\n"])

@@ -13,8 +13,10 @@ from optuna.storages.journal import BaseJournalBackend
 
 from surehold.store.locks import file_lock
 
-__all__ = ["REPLACED", "Journal"]
+__all__ = ["READ_ONLY", "REPLACED", "Journal"]
 
+#: What the system says of a file that it does not write.
+READ_ONLY: Final = (errno.EACCES, errno.EPERM, errno.EROFS)
 #: What is said where the file of a storage is not the one that was opened.
 REPLACED: Final = (
     "it is another file, or shorter, than the one that this program has read, and what the program knows is not in it; "
@@ -47,7 +49,11 @@ class Journal(BaseJournalBackend):
 
     def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
         """Yield the operations from that number on; see Optuna."""
-        self._mend_end()
+        try:
+            self._mend_end()
+        except OSError as error:
+            if error.errno not in READ_ONLY:  # a copy that was made while a line was written: it is passed over
+                raise
         if log_number_from != self._number:
             self._forget()
         with open(self._path, "rb") as journal:

@@ -27,7 +27,7 @@ from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, get_st
 from optuna.storages.journal._storage import NOT_FOUND_MSG
 
 from surehold.errors import InputError
-from surehold.studies.journal import REPLACED, Journal
+from surehold.studies.journal import READ_ONLY, REPLACED, Journal
 from surehold.studies.study_lock import StudyLock
 
 __all__ = ["JOURNAL", "Storage", "StorageFailure", "checked_name", "open_storage"]
@@ -36,7 +36,6 @@ JOURNAL: Final = "journal.log"
 _SCHEMES: Final = "a journal file (path or journal:///path), sqlite:///file.db, postgresql://user@host/database, memory"
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _TELLING: Final = ".telling"  # ending of the file that is locked while trials are told
-_READ_ONLY: Final = (errno.EACCES, errno.EPERM, errno.EROFS)  # what the system says of a file that it does not write
 _SQLITE_PATIENCE: Final = 30.0  # seconds to wait for another process' write; ?timeout= in the URL overrides it
 
 
@@ -100,7 +99,7 @@ class Storage:
             reason = str(getattr(cause, "orig", None) or cause).strip().splitlines()[0]
             raise StorageFailure(f"storage {self.shown} cannot be used: {reason}. Nothing was changed.") from error
         except OSError as error:
-            hint = "; copy it to a place that can be written" if error.errno in _READ_ONLY else ""
+            hint = "; copy it to a place that can be written" if error.errno in READ_ONLY else ""
             raise StorageFailure(f"storage {self.shown} cannot be used: {error.strerror or error}{hint}.") from error
         except KeyError as error:
             if error.args != (NOT_FOUND_MSG,):  # in Optuna's words: deleted by its dashboard, or an older copy is there
@@ -170,7 +169,7 @@ def _check_writable(path: Path, create: bool) -> bool:
         with open(path, "ab"):
             return True
     except OSError as error:
-        if create or error.errno not in _READ_ONLY:
+        if create or error.errno not in READ_ONLY:
             raise
         return False
 
