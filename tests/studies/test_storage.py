@@ -347,3 +347,18 @@ def test_a_study_that_was_deleted_is_said_to_be_gone(file, tmp_path, monkeypatch
             attempt()
     robot.close()
     other.close()
+
+
+def test_a_creation_that_was_cut_off_is_made_again(url, monkeypatch):
+    """A kill, or a full disk, between the study and its settings left a name that could be neither used nor created."""
+    with monkeypatch.context() as full:
+        full.setattr(optuna.Study, "set_user_attr", lambda *_: (_ for _ in ()).throw(OSError(errno.ENOSPC, "full")))
+        with pytest.raises(StorageFailure, match="full"):
+            RobotStudy.create("mug", SETTINGS, url)
+    with pytest.raises(InputError, match="not created by surehold"):
+        RobotStudy.open("mug", url)
+    robot = RobotStudy.create("mug", SETTINGS, url)
+    assert robot.ask().id == 0
+    robot.close()
+    with pytest.raises(InputError, match=r"exists in .*; use it, or choose another name"):
+        RobotStudy.create("mug", SETTINGS, url)

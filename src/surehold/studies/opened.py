@@ -83,9 +83,13 @@ class OpenedStudy:
         check_columns(settings)
         opened = open_storage(storage, checked_name(name), create=True)
         with opened.closed_on_error(), opened.failures(), opened.handing_out():
-            if name not in optuna.get_all_study_names(opened.backend):
-                direction = StudyDirection[settings.direction.upper()]
+            there = name in optuna.get_all_study_names(opened.backend)
+            direction = StudyDirection[settings.direction.upper()]
+            if there:
+                study = optuna.load_study(study_name=name, storage=opened.backend)
+            else:
                 study = optuna.create_study(storage=opened.backend, study_name=name, direction=direction)
+            if not there or _is_half_made(study, direction):
                 study.set_user_attr(SETTINGS, settings.to_json())
             elif not resume:
                 raise InputError(f"study '{name}' exists in {opened.shown}; use it, or choose another name.")
@@ -197,3 +201,8 @@ class OpenedStudy:
         with self.sampler.optimizing(self.settings.space, history, self.settings.direction) as optimizer:
             promise = optimizer.promise()
             return promise if np.isfinite(promise) else None
+
+
+def _is_half_made(study: Study, direction: StudyDirection) -> bool:
+    """Tell whether a study was created, but its settings not written: the creation was killed, or the disk was full."""
+    return not study.user_attrs and not study.get_trials(deepcopy=False) and study.directions == [direction]
