@@ -86,3 +86,55 @@ def test_a_trial_that_does_not_fit_names_the_option_that_leaves_it_out(here):
     (here / "rig.csv").write_text("dx,value\n0.5,0.7\n")
     with pytest.raises(InputError, match=r"line 2: .*Nothing was imported; .* with --skip-bad\."):
         import_trials(created("warm"), trials_of_csv("rig.csv", NAMES))
+
+
+def test_decimal_commas_are_no_further_cells(here):
+    """Of 0,01 and 0,7 came a trial at 0 whose value was 1."""
+    study = RobotStudy.create("warm", StudySettings(SearchSpace({"dx": (0.0, 1.0)})), "warm.log")
+    (here / "rig.csv").write_text("dx,value\n0,5,0,7\n0.3,1\n0.2,4,,\n")
+    found = trials_of_csv("rig.csv", NAMES)
+    with pytest.raises(
+        InputError, match=r"line 2: there are more cells than the 2 columns .* first \['0'\]; .* points"
+    ):
+        import_trials(study, found)
+    made = import_trials(study, found, skip_bad=True)
+    assert [trial.values for trial in study.trials()] == [[1.0], [4.0]]
+    assert [why[:15] for why in made.left_out] == ["rig.csv, line 2"]
+
+
+def test_a_cell_may_hold_what_ends_a_line_elsewhere(here):
+    study = created("warm")
+    (here / "rig.csv").write_text(
+        'dx,value,note\n0.01,1,"two\nlines"\n0.02,2,a\x0cb\n0.03,3,a\u2028b\n', encoding="utf-8"
+    )
+    assert import_trials(study, trials_of_csv("rig.csv", NAMES)).values == 3
+    assert [trial.user_attrs["surehold:note"][-6:] for trial in study.trials()] == ["line 3", "line 4", "line 5"]
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "value", "words"),
+    [
+        ('dx,value,note\n0.01,1,"ok\n0.02,2,\n0.03,3,\n', NAMES, "value", "no CSV behind line 1 .* quotation mark"),
+        ("dx,value,note\n0.01,1," + "a" * 200_000, NAMES, "value", "no CSV behind line 1"),
+        ("dx,value\n0.01,1\n", NAMES, "dx", "column 'dx' of file 'rig.csv' is to be parameter 'dx' and the value"),
+        ("a,value\n0.01,1\n", {"dx": "a", "dy": "a"}, "value", "is to be parameter 'dx' and parameter 'dy'"),
+    ],
+)
+def test_files_that_would_be_misread(here, text, columns, value, words):
+    (here / "rig.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        trials_of_csv("rig.csv", columns, value)
+
+
+def test_a_file_in_another_encoding_is_told_which(here):
+    (here / "rig.csv").write_text("dx,value,qualität\n0.01,1,2\n", encoding="latin-1")
+    with pytest.raises(InputError, match=r"no text in UTF-8 .*; save it as CSV in UTF-8"):
+        trials_of_csv("rig.csv", NAMES)
+
+
+def test_a_study_is_not_imported_into_itself(here, capsys):
+    study = created("warm")
+    study.tell(study.ask().id, 0.5)
+    assert run(["study", "import", "warm", "--study", "warm", "--from", "warm.log", "--storage", "warm.log"]) == 2
+    assert "has its own trials already" in capsys.readouterr().err
+    assert len(study.trials()) == 1

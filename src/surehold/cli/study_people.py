@@ -143,7 +143,7 @@ def import_trials(
     if file:
         found = warm_start.trials_of_csv(file, names, value, outputs)
     else:
-        former = warm_start.former_study(study, source)
+        former = warm_start.former_study(study, source, target)
         found = warm_start.trials_of_study(former, names, target.settings.direction, outputs)
     made = warm_start.import_trials(target, found, skip_bad=skip_bad)
     count = made.values + len(made.failed)

@@ -4,6 +4,7 @@ All rows are checked before the first is stored. A trial that an earlier import 
 """
 
 import csv
+import io
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,6 +14,7 @@ import optuna
 from optuna.study import Study
 from optuna.trial import TrialState
 
+from surehold.amounts import amount
 from surehold.errors import InputError
 from surehold.optimization.limits import checked_outputs
 from surehold.store.csv_cells import cell_text
@@ -45,6 +47,8 @@ class FormerTrial(NamedTuple):
     """further outputs; None for one that was not measured"""
     why: str = ""
     """of a failed trial, what says that it failed, such as "has no value" """
+    wrong: str = ""
+    """why what was found is not to be believed; empty where it is"""
 
     @property
     def place(self) -> str:
@@ -84,18 +88,30 @@ def trials_of_csv(
     Raises
     ------
     InputError
-        If the file cannot be read, its columns are not separated by commas, or one is missing or there twice.
+        If the file cannot be read, its columns are not separated by commas, one is missing, there twice or meant for
+        two things, or quotation marks do not fit.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"file {path!r} cannot be read: {getattr(error, 'strerror', None) or error}.") from None
-    reader = csv.DictReader(text.splitlines())
-    columns = list(reader.fieldnames or [])
+        text = Path(path).read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"file {path!r} is no text in UTF-8 ({error.reason}); save it as CSV in UTF-8.") from None
+    except OSError as error:
+        raise InputError(f"file {path!r} cannot be read: {error.strerror or error}.") from None
+    reader = csv.DictReader(io.StringIO(text, newline=""), strict=True)
+    rows: list[tuple[int, dict[str, Any]]] = []
+    try:
+        columns = list(reader.fieldnames or [])
+        for row in reader:
+            rows.append((reader.line_num, row))
+    except csv.Error as error:
+        last = rows[-1][0] if rows else 1
+        raise InputError(
+            f"file {path!r} is no CSV behind line {last} ({error}); is a quotation mark missing there?"
+        ) from None
     _check_columns(path, columns, names, value)
     found = []
     measured = {name: column for name in outputs for column in (name, f"output_{name}") if column in columns}
-    for row in reader:
+    for line, row in rows:
         state = (row.get("state") or "").strip().lower()
         if state in _UNFINISHED:
             continue
@@ -108,11 +124,13 @@ def trials_of_csv(
         parameters = {name: cell_text((row[column] or "").strip()) for name, column in names.items()}
         failed = state in _FAILED or not told
         why = f"has state {state}" if state in _FAILED else "has no value"
-        where = f"{Path(path).name}, line {reader.line_num}"
+        where = f"{Path(path).name}, line {line}"
         of = None if failed else (row.get("of") or "").strip() or None
         told_outputs = {name: cell_text((row[column] or "").strip()) or None for name, column in measured.items()}
         trial = FormerTrial(where, parameters, None if failed else told, failed, reached, of, told_outputs)
-        found.append(trial._replace(why=why if failed else ""))
+        more = [cell for cell in row.get(None, ()) if cell.strip()]  # type: ignore[call-overload]
+        wrong = f"there are more cells than the {amount(len(columns), 'column')} of the header, first {more[:1]}"
+        found.append(trial._replace(why=why if failed else "", wrong=wrong if more else ""))
     return found
 
 
@@ -134,6 +152,11 @@ def _check_columns(path: str, columns: list[str], names: Mapping[str, str], valu
             raise InputError(f"file {path!r} has no column {column!r}; it has {', '.join(columns) or 'none'}.{hint}")
         if columns.count(column) > 1:
             raise InputError(f"file {path!r} has {columns.count(column)} columns {column!r}; leave one.")
+    meant = [(column, f"parameter {parameter!r}") for parameter, column in names.items()] + [(value, "the value")]
+    for column, what in meant:
+        others = [other for there, other in meant if there == column and other != what]
+        if others:
+            raise InputError(f"column {column!r} of file {path!r} is to be {what} and {others[0]}; name two columns.")
 
 
 def _bare(column: str) -> str:
@@ -188,6 +211,8 @@ def import_trials(study: RobotStudy, trials: list[FormerTrial], *, skip_bad: boo
     stored = {_identity(t.user_attrs.get(NOTE), t.params, t.values[0] if t.values else None) for t in study.trials()}
     for trial in trials:
         try:
+            if trial.wrong:
+                raise InputError(f"{trial.wrong}; write numbers with points, and texts that hold a comma in quotes.")
             if trial.of is not None and settings.get("outcome") == "success":
                 trial = trial._replace(value=count_told(trial.value, trial.of))
             number = checked_value(answer(settings, trial.value)[0], trial.failed)
@@ -227,9 +252,17 @@ def _identity(note: str | None, parameters: Mapping[str, Any], value: float | No
     return note, tuple(sorted(parameters.items())), value
 
 
-def former_study(name: str, storage: str) -> Study:
-    """Return any single study of Optuna, surehold's or not, to read from; raises InputError where it is not there."""
+def former_study(name: str, storage: str, into: RobotStudy) -> Study:
+    """Return any single study of Optuna, surehold's or not, to read from.
+
+    Raises
+    ------
+    InputError
+        If it is not there, or is the one that its trials are for: each would count twice.
+    """
     opened = open_storage(storage, name, create=False)
+    if (name, opened.url) == (into.name, into.storage.url):
+        raise InputError(f"study '{name}' in {opened.shown} has its own trials already; name another one.")
     with opened.failures():
         names = optuna.get_all_study_names(opened.backend)
         if name not in names:
