@@ -18,6 +18,7 @@ def folder(tmp_path, monkeypatch):
         "number = 3\n"
     )
     (tmp_path / "broken.py").write_text("1 / 0\n")
+    (tmp_path / "program.py").write_text("import sys\ndef f(x):\n    return 1.0\nsys.exit(0)\n")
     (tmp_path / "lacks.py").write_text("import no_such_module_at_all\n")
     (tmp_path / "empty.py").write_text("number = 3\n")
     monkeypatch.chdir(tmp_path)
@@ -48,6 +49,8 @@ def test_from_a_file_and_from_a_module(folder):
         ("empty:f", "no function 'f'"),
         ("broken.py:f", "fails to load: ZeroDivisionError"),
         ("broken:f", "fails to load: ZeroDivisionError"),
+        ("program.py:f", "fails to load: SystemExit: 0"),
+        ("program:f", "fails to load: SystemExit: 0"),
         ("lacks:f", "fails to load: No module named 'no_such_module_at_all'"),
     ],
 )
@@ -73,6 +76,14 @@ def test_the_function_cannot_change_the_point():
     point = np.array([0.5])
     Function(greedy, Box.unit(1))(point)
     assert point[0] == 0.5
+
+
+def test_a_function_does_not_end_the_run():
+    """The command ended without a word, with the exit code of the function, and the trials before were lost."""
+    own = Function(lambda x: sys.exit(3), Box.unit(1), name="f")
+    for call in (own, own.trial):
+        with pytest.raises(RuntimeError, match=r"it called sys\.exit\(3\)"):
+            call(np.array([0.5]))
 
 
 @pytest.mark.parametrize("value", ["fast", None, [1.0, 2.0], 1 + 2j])

@@ -62,6 +62,14 @@ def test_failures_are_told_and_do_not_end_the_worker(study):
     assert work(study, attempt(f)) == 0
 
 
+def test_a_function_that_exits_has_failed(study):
+    seen = []
+    function = attempt(lambda x: sys.exit("no robot"))
+    assert work(study, function, most=2, after=lambda asked, outcome: seen.append(outcome.failure)) == 2
+    assert seen == ["it called sys.exit(no robot)"] * 2
+    assert [trial.state for trial in study.trials()] == [TrialState.FAIL] * 2
+
+
 def test_a_worker_makes_no_more_than_it_may(study):
     assert work(study, attempt(lambda x: x[0]), most=3) == 3
     assert len(study.trials()) == 3
@@ -147,8 +155,9 @@ def test_the_problem_of_a_study_is_found_again(tmp_path):
 
 
 def test_a_lifetime_must_be_positive(study):
-    with pytest.raises(InputError, match="lifetime"):
-        work(study, attempt(lambda x: x[0]), lifetime=0.0)
+    for lifetime in (0.0, float("nan"), float("inf"), 1e12):  # for longer no thread can wait
+        with pytest.raises(InputError, match="lifetime"):
+            work(study, attempt(lambda x: x[0]), lifetime=lifetime)
     assert sys.modules["surehold.studies.worker"].LIFETIME > 0.0
 
 

@@ -25,7 +25,8 @@ class Function:
     ----------
     f
         Called with one point (d,) float64 in the units of the box; returns a number, or a number and a dictionary of
-        further outputs. What it raises passes through.
+        further outputs. What it raises passes through, but for SystemExit: sys.exit() would end the run, and is an
+        error of the trial.
     box
         Named bounds of the d inputs.
     name
@@ -52,10 +53,13 @@ class Function:
 
     def trial(self, x: NDArray[np.float64]) -> Any:
         """Return whatever the function does at one x (d,): a number, or a number and {name: value} of more outputs."""
-        return self._f(x)
+        try:
+            return self._f(x)
+        except SystemExit as end:
+            raise RuntimeError(f"it called sys.exit({'' if end.code is None else end.code})") from end
 
     def _value(self, point: NDArray[np.float64]) -> float:
-        value = self._f(point.copy())
+        value = self.trial(point.copy())
         if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], Mapping):
             value = value[0]
         try:
@@ -150,7 +154,7 @@ def _from_file(place: str) -> ModuleType:
     sys.path.insert(0, folder)  # as `python path/file.py` does, so that the file finds its neighbors
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # a program without `if __name__ == "__main__"` may call sys.exit()
         raise InputError(f"file {place!r} fails to load: {type(error).__name__}: {error}") from error
     finally:
         if folder in sys.path:
@@ -172,7 +176,7 @@ def _from_name(place: str) -> ModuleType:
                 "path/to/file.py:function."
             ) from None
         raise InputError(f"module {place!r} fails to load: {error}") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(f"module {place!r} fails to load: {type(error).__name__}: {error}") from error
     finally:
         if added and here in sys.path:

@@ -39,6 +39,8 @@ def trial_function(f: Callable[[Any], Any], space: SearchSpace) -> Callable[[Map
             return Outcome(*evaluate(f, np.array([parameters[n] for n in space.distributions], dtype=np.float64)))
         except InputError as error:  # cannot be called at all
             return Outcome(np.nan, str(error))
+        except SystemExit as end:  # it would end the worker, and each one that takes the trial up
+            return Outcome(np.nan, f"it called sys.exit({'' if end.code is None else end.code})")
 
     return attempt
 

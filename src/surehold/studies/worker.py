@@ -28,6 +28,7 @@ from surehold.studies.trial_function import Outcome
 __all__ = ["LIFETIME", "work", "worker_name"]
 
 LIFETIME: Final = 120.0  # seconds of silence after which a worker counts as dead
+_LONGEST: Final = 1e9  # seconds; for ten times as long no thread can wait
 _BEATS: Final = 4  # signs of life in a lifetime
 _POLL: Final = 1.0  # seconds between two looks at a study that has nothing to hand out
 _PATIENCE: Final = (
@@ -87,8 +88,8 @@ def work(
         On Ctrl-C; the trial under way is let go, so that another worker can take it up at once.
     """
     name = name or worker_name()
-    if not lifetime > 0.0:
-        raise InputError(f"lifetime is {lifetime!r}; give a positive number of seconds.")
+    if not 0.0 < lifetime <= _LONGEST:
+        raise InputError(f"lifetime is {lifetime!r}; give a positive number of seconds, {_LONGEST:g} at most.")
     made, waiting = 0, False
     while most is None or made < most:
         try:
