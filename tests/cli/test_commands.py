@@ -102,6 +102,8 @@ def here(tmp_path, monkeypatch):
         ("maximize own.py:hil --bounds a=0:1", "did you mean 'hill'"),
         ("maximize gone.py:hill --bounds a=0:1", "does not exist"),
         ("maximize rkhs --colour red", "--colour"),
+        ("maximize rkhs --study=", "option --study is given an empty text; give a value, or leave the option out"),
+        ("maximize rkhs --feasible 0", "feasible is 0.0; give a probability"),
         ("maximize", "Missing argument 'problem'"),
         ("maximise rkhs", "maximise"),
         ("grasp mugg", "did you mean 'mug'"),
@@ -120,6 +122,15 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, message, capsys):
     assert captured.err.count("\n") == 1, captured.err
     assert captured.err.startswith("error: ")
     assert message in captured.err
+
+
+def test_a_variable_of_the_shell_that_is_not_set_is_no_value(here, capsys):
+    """The run went on, and was kept in no study."""
+    assert run(["maximize", "rkhs", "--trials", "5", "--study", ""]) == 2
+    assert capsys.readouterr().err == (
+        "error: option --study is given an empty text; give a value, or leave the option out.\n"
+    )
+    assert not (here / "runs").exists()
 
 
 def test_an_own_function_from_start_to_report(here, capsys):

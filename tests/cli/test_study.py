@@ -89,6 +89,19 @@ def test_executions_that_leave_the_ranges_are_named(study, capsys):
     assert " along x leave it. Nothing was" in capsys.readouterr().out
 
 
+def test_a_robot_stops_at_the_border(study):
+    """What it says is what an optimizer says that is told so."""
+    assert study("create edge --parameters x=0:1 --noise x=0.1 --border clip")["optimizer"]["border"] == "clip"
+    other = sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), input_noise=sh.InputNoise({"x": 0.1}), border="clip", seed=0)
+    for k in range(9):
+        study(f"add edge --at x={k / 8} {k / 8}")
+        other.tell([k / 8], k / 8)
+    found, same = study("recommend edge"), other.recommend()
+    assert (found["outside"], found["parameters"]) == ({}, {"x": 1.0})
+    assert found["mean"] == pytest.approx(same.mean, abs=1e-9)
+    assert found["mean"] < 0.98, "half of the executions stop at the border, the others fall short of it"
+
+
 def test_stop_says_when_asking_ends(study, capsys):
     study(CREATE)
     for options, words in (
@@ -231,6 +244,12 @@ def test_warm_start_from_a_file_and_from_a_study(study, here):
         ("create a --parameters dx=0:1,dx=0:2", "named twice"),
         ("create a --parameters dx=0:1:log", "not understood .a logarithmic range lies above 0"),
         ("create a --parameters dx=a/a", "each can be there once"),
+        ("create a --parameters dx=a/", "a choice is empty"),
+        ("create a --parameters dx=0:1 --initial -1", "n_initial is -1"),
+        ("create a --parameters dx=0:1 --feasible 0", "feasible is 0.0; give a probability"),
+        ("create a --parameters dx=0:1 --constraint t<=3 --safety 0 --first dx=0.5", "safety is 0.0"),
+        ("create a --parameters dx=0:1 --noise none --border clip", "--border clip is of executions under input noise"),
+        ("create a --parameters dx=0:1 --border clop", "did you mean 'clip'"),
         ("create a --parameters dx=0:1:step=2", "wider than its range"),
         ("create a --parameters dx=0:1:step=0", "a step of 0 leads nowhere.; write NAME="),
         ("create a --parameters dx=0:1:step=z", "not understood"),

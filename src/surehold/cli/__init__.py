@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 
 __all__ = ["completed", "main"]
 
@@ -39,6 +40,7 @@ def _run(arguments: list[str]) -> int:
 
     from surehold.cli.application import application
 
+    _refuse_empty(arguments)
     try:
         code = typer.main.get_command(application())(
             args=completed(arguments), prog_name="surehold", standalone_mode=False
@@ -58,6 +60,19 @@ def _run(arguments: list[str]) -> int:
         return int(getattr(error, "exit_code", 2))
     except typer.Abort:
         return _interrupted()
+
+
+def _refuse_empty(arguments: list[str]) -> None:
+    """Raise InputError where an option is given an empty text, as by a variable of the shell that is not set.
+
+    It would count as not given: the run is kept in no study, another model is taken.
+    """
+    from surehold.errors import InputError
+
+    pairs = [*pairwise(arguments), *(argument.partition("=")[::2] for argument in arguments if "=" in argument)]
+    for option, value in pairs:
+        if option.startswith("--") and option != "--" and not value.strip():
+            raise InputError(f"option {option} is given an empty text; give a value, or leave the option out.")
 
 
 def _in_words(error: Exception) -> str:

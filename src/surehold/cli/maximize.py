@@ -9,6 +9,7 @@ from surehold.cli.options import (
     Allowed,
     Constraint,
     Failures,
+    Feasible,
     First,
     Guess,
     Initial,
@@ -81,11 +82,9 @@ def maximize(
     ] = False,
     constraint: Constraint = None,
     allowed: Allowed = None,
-    feasible: Annotated[
-        float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
-    ] = 0.0,
+    feasible: Feasible = None,
     failures: Failures = "",
-    safety: Safety = 0.0,
+    safety: Safety = None,
     first: First = None,
     guess: Guess = "",
     outcome: Annotated[

@@ -13,6 +13,7 @@ __all__ = [
     "Allowed",
     "Constraint",
     "Failures",
+    "Feasible",
     "First",
     "Guess",
     "Initial",
@@ -95,8 +96,11 @@ Failures = Annotated[
         show_default=False,
     ),
 ]
+Feasible = Annotated[
+    float | None, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
+]
 Safety = Annotated[
-    float,
+    float | None,
     typer.Option(
         help="Probability with which every trial after the --first ones, which are trusted, keeps all constraints.",
         show_default=False,
@@ -203,9 +207,9 @@ def _number(text: str) -> float:
 def limits_given(
     constraint: list[str] | None,
     allowed: list[str] | None,
-    feasible: float = 0.0,
+    feasible: float | None = None,
     failures: str = "",
-    safety: float = 0.0,
+    safety: float | None = None,
     first: list[str] | None = None,
     guess: str = "",
 ) -> dict[str, Any]:
@@ -225,10 +229,11 @@ def limits_given(
     limits_of(limits)
     for text in allowed or ():
         Linear.parse(text)
-    given: dict[str, Any] = {"constraints": limits, "allowed": list(allowed or ()), "feasible": feasible}
-    given |= {"failures": failures, "safety": safety, "guess": _values(guess, "--guess") if guess else {}}
-    given |= {"initial_points": [_values(text, "--first") for text in first or ()]}
-    return {name: value for name, value in given.items() if value}
+    given: dict[str, Any] = {"constraints": limits, "allowed": list(allowed or ()), "failures": failures}
+    given["initial_points"] = [_values(text, "--first") for text in first or ()]
+    given["guess"] = _values(guess, "--guess") if guess else {}
+    shares = {"feasible": feasible, "safety": safety}  # of which 0 is refused
+    return {k: v for k, v in given.items() if v} | {k: v for k, v in shares.items() if v is not None}
 
 
 def _values(text: str, option: str) -> dict[str, float | str]:

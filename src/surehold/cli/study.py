@@ -8,7 +8,7 @@ import typer
 
 from surehold.amounts import amount
 from surehold.cli import study_people, study_service
-from surehold.cli.options import Allowed, Constraint, Failures, First, Guess, RiskMeasure, Safety, Surrogate
+from surehold.cli.options import Allowed, Constraint, Failures, Feasible, First, Guess, RiskMeasure, Safety, Surrogate
 from surehold.cli.study_options import Json, Name, Outputs, Storage, nothing_said, opened, quiet, say, write_out
 
 __all__ = ["studies"]
@@ -70,6 +70,14 @@ def create(
     surrogate: Surrogate = "",
     criterion: Annotated[str, typer.Option(help="As in surehold.Optimizer.", show_default=False)] = "",
     risk: RiskMeasure = "",
+    border: Annotated[
+        str,
+        typer.Option(
+            help="What executions do that would leave the box: extend (they leave it, the model is asked there; "
+            "default), clip (they stop at the border) or keep (that parameter stays as commanded).",
+            show_default=False,
+        ),
+    ] = "",
     observation_noise: Annotated[
         str, typer.Option(help="Of the values: none, inferred, heteroscedastic, or a standard deviation.")
     ] = "none",
@@ -77,11 +85,9 @@ def create(
     direction: Annotated[str, typer.Option(help="Of the values: maximize or minimize.")] = "maximize",
     constraint: Constraint = None,
     allowed: Allowed = None,
-    feasible: Annotated[
-        float, typer.Option(help="Probability with which the answer keeps all constraints.", show_default=False)
-    ] = 0.0,
+    feasible: Feasible = None,
     failures: Failures = "",
-    safety: Safety = 0.0,
+    safety: Safety = None,
     first: First = None,
     guess: Guess = "",
     outcome: Annotated[
@@ -104,15 +110,17 @@ def create(
     asked = risk_of(risk, "ubo", preset, outcome)
     optimizer |= {} if asked is None or asked.name == "mean" else {"risk": asked}
     optimizer |= {} if observation_noise == "none" else {"noise": _number_or_word(observation_noise)}
-    optimizer |= {k: v for k, v in (("surrogate", surrogate), ("criterion", criterion), ("preset", preset)) if v}
+    named = (("surrogate", surrogate), ("criterion", criterion), ("preset", preset), ("border", border))
+    optimizer |= {k: v for k, v in named if v}
     optimizer |= limits_given(constraint, allowed, feasible, failures, safety, first, guess)
     input_noise = noise_of(_NOISE if noise is None else noise, "bo")
     if space.box is None or space.box.numbers is None:
         if input_noise is not None and noise is not None:
             raise InputError(f"--noise is {noise}, but all parameters are choices, which carry none; leave it out.")
         input_noise = None
-    if input_noise is None and "risk" in optimizer:
-        raise InputError(f"--risk {risk} is of the outcome under input noise, and there is none; give --noise.")
+    for option, given in (("risk", risk), ("border", border)):
+        if input_noise is None and option in optimizer:
+            raise InputError(f"--{option} {given} is of executions under input noise, and there is none; give --noise.")
     settings = StudySettings(
         space, input_noise, parse_assignments(units, "--units") if units else {}, optimizer, described, direction
     )

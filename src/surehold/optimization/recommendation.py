@@ -204,7 +204,7 @@ def outside_in_words(outside: Mapping[str, float]) -> str:
         f"The recommended input is near the border of the box: of 100 executions {', '.join(many)} leave it. Nothing "
         "was tried there, and the model goes on as inside: behind a cliff they would be worth less. Execute it a few "
         "times before you rely on it, or widen the box if trials can be made there; where executions stop at the "
-        'border, say so in Python: border="clip".'
+        'border, say so: border="clip" in Python, --border clip where a study is created.'
     )
 
 

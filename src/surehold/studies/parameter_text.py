@@ -58,7 +58,10 @@ def _described(described: str) -> list[Any] | tuple[Any, ...]:
     """Return what `SearchSpace` takes for the bounds, or the choices, of one parameter."""
     for between in ("|", "/"):  # "/" needs no quotes in a shell; with "|", choices may hold a "/"
         if between in described:
-            return [choice.strip() for choice in described.split(between)]
+            choices = [choice.strip() for choice in described.split(between)]
+            if "" in choices:
+                raise ValueError("a choice is empty")
+            return choices
     lower, *rest = described.split(":")
     if not rest:
         try:

@@ -217,7 +217,7 @@ class Sampler(BaseSampler):
         if given is None:
             box = space.box or Box.unit(1)
             given = Optimizer.default_n_initial(box, len(box.variables) - len(self._settings.get("fixed") or ()))
-        return max(given, first)
+        return max(given, first) if first else given
 
     @contextmanager
     def optimizing(self, space: SearchSpace, history: History, direction: str) -> Iterator[Optimizer]:
