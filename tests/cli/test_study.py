@@ -395,9 +395,37 @@ def test_a_run_with_other_settings_is_refused(change, message, capsys):
     assert re.search(message, capsys.readouterr().err)
 
 
+def test_a_run_goes_on_in_a_folder_that_was_moved(study, here, capsys, monkeypatch):
+    (here / "before").mkdir()
+    (here / "own.py").rename(here / "before" / "own.py")
+    monkeypatch.chdir(here / "before")
+    assert run([*OWN_RUN.split(), "--trials", "5"]) == 0
+    (here / "before").rename(here / "now")
+    monkeypatch.chdir(here / "now")
+    assert run(["study", "work", "hill"]) == 2
+    assert "its folder was moved, say where it is now: --function" in capsys.readouterr().err
+    assert run([*OWN_RUN.split(), "--trials", "6"]) == 0
+    assert study("status hill")["complete"] == 6
+    (here / "now" / "own.py").rename(here / "now" / "other.py")
+    capsys.readouterr()
+    assert run([*OWN_RUN.replace("own.py", "other.py").split(), "--trials", "7"]) == 2
+    assert "with other settings: function: " in capsys.readouterr().err
+
+
 def test_a_storage_needs_a_study(capsys):
     assert run(["maximize", "rkhs", "--trials", "3", "--initial", "3", "--storage", "a.log"]) == 2
     assert "no --study" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "line", ["study create a --parameters x=0:1", "maximize rkhs --trials 3 --initial 3 --study a"], ids=str.split
+)
+def test_what_is_gone_with_the_command_is_no_storage(line, capsys, monkeypatch, here):
+    assert run([*line.split(), "--storage", "memory"]) == 2
+    assert "--storage memory is gone when this command ends; give a file, such as" in capsys.readouterr().err
+    monkeypatch.setenv("SUREHOLD_STORAGE", "memory")
+    assert run(line.split()) == 2
+    assert not (here / "runs" / "a" / "report.html").exists()
 
 
 def test_a_grasp_is_kept_and_worked_on(study):

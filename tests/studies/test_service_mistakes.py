@@ -52,6 +52,12 @@ def test_slips_of_the_body(client, call, body, kind, words):
     assert "Input should" not in detail
 
 
+@pytest.mark.parametrize("body", [b"[" * 30_000, b'{"id": ' + b"9" * 5000 + b"}", b'{"id": "\xff"}'])
+def test_a_body_that_no_json_can_be_made_of(client, body):
+    answer = client.post("/studies/arm/tell", content=body, headers={"Content-Type": JSON})
+    assert (answer.status_code, "cannot be read as JSON: too deep" in answer.json()["detail"]) == (400, True)
+
+
 @pytest.mark.parametrize("value", ["NaN", '"abc"', "[1]"])
 def test_a_wrong_value_is_told_once_what_the_study_takes(client, outcome, value):
     detail = said(client, "tell", f'{{"id": 3, "value": {value}}}'.encode())

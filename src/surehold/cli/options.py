@@ -31,6 +31,7 @@ __all__ = [
     "Surrogate",
     "Trials",
     "checked_method",
+    "lasting",
     "limits_given",
     "noise_of",
     "numbers_given",
@@ -132,6 +133,15 @@ Noise = Annotated[
         help="Input noise: a share of every range (0.03), or NAME=DEVIATION,... in the variables' units; none with bo."
     ),
 ]
+
+
+def lasting(storage: str) -> str:
+    """Return the URL of a storage; raises InputError for that of a process, which no later command finds again."""
+    if storage == "memory":
+        raise InputError(
+            "--storage memory is gone when this command ends; give a file, such as study.log or sqlite:///study.db."
+        )
+    return storage
 
 
 def checked_method(method: str) -> str:

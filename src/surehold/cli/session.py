@@ -18,7 +18,7 @@ from surehold.amounts import amount
 from surehold.cli.compilation import announced, warm_up
 from surehold.cli.folders import folder_of, removed_on_error
 from surehold.cli.interruption import terminable, undisturbed
-from surehold.cli.options import METHODS, REQUERIES
+from surehold.cli.options import METHODS, REQUERIES, lasting
 from surehold.cli.requeries import requeried
 from surehold.cli.terminal import terminal
 from surehold.errors import InputError, SureholdError
@@ -54,6 +54,8 @@ class Kept:
     def __post_init__(self) -> None:
         if self.storage and not self.study:
             raise InputError(f"--storage {self.storage} is given, but no --study; name the study to keep there.")
+        if self.study:
+            lasting(self.url)
 
     @property
     def url(self) -> str:

@@ -97,7 +97,7 @@ def create(
     as_json: Json = False,
 ) -> None:
     """Create a study."""
-    from surehold.cli.options import limits_given, noise_of, risk_of
+    from surehold.cli.options import lasting, limits_given, noise_of, risk_of
     from surehold.errors import InputError
     from surehold.studies.parameter_text import parse_assignments
     from surehold.studies.robot import RobotStudy
@@ -125,7 +125,7 @@ def create(
         space, input_noise, parse_assignments(units, "--units") if units else {}, optimizer, described, direction
     )
     quiet()
-    study = RobotStudy.create(name, settings, storage)
+    study = RobotStudy.create(name, settings, lasting(storage))
     found = {"name": name, "storage": study.storage.shown, **settings.to_json()}
     say(found, f"Created study {name} in {study.storage.shown}: {', '.join(space.distributions)}.", as_json)
 

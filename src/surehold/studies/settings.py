@@ -126,11 +126,11 @@ class StudySettings:
             for key in mine[part] | theirs[part]:
                 ours, asked = (side[part].get(key) for side in (mine, theirs))
                 if part == "problem" and isinstance(ours, dict) and isinstance(asked, dict):
-                    differing = [k for k in ours | asked if ours.get(k) != asked.get(k)]
+                    differing = [k for k in ours | asked if not _same(ours.get(k), asked.get(k))]
                     ours, asked = ({k: side.get(k) for k in differing} for side in (ours, asked))
                 if key == "risk":
                     ours, asked = (str(side.optimizer.get(key, Risk())) for side in (self, other))
-                if ours != asked:
+                if ours != asked and not (part == "problem" and _same(ours, asked)):
                     found.append(f"{name} {key}: {_short(ours)} in the study, {_short(asked)} now".strip())
         names, asked = (list(side["parameters"]) for side in (mine, theirs))
         if names != asked and set(names) == set(asked):  # a function that takes an array tells them by their places
@@ -157,6 +157,15 @@ def _found_from_anywhere(problem: Mapping[str, Any]) -> dict[str, Any]:
                 words[option] = str(Path(words[option]).resolve())
         found |= {kind: words} if words else {}
     return found
+
+
+def _same(ours: Any, asked: Any) -> bool:
+    """Tell whether two words of a problem say the same: one may name a file by where it was before it was moved."""
+    if ours == asked or not (isinstance(ours, str) and isinstance(asked, str)):
+        return bool(ours == asked)
+    (mine, _, function), (theirs, _, other) = (text.partition(".py:") for text in (ours, asked))
+    before, now = Path(mine + ".py" * bool(function)), Path(theirs + ".py" * bool(other))
+    return before.is_absolute() and (before.name, function) == (now.name, other) and not before.exists()
 
 
 def _short(value: Any) -> str:

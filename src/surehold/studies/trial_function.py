@@ -1,6 +1,7 @@
 """What the workers of a study try: the problem that is written into the study, or a function of the user's own."""
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,6 +61,12 @@ def problem_of(settings: StudySettings, function: str = "") -> Callable[[Any], A
         return load_function(function)
     described = dict(settings.problem)
     if "function" in described:
+        place = described["function"].rpartition(":")[0]
+        if place.endswith(".py") and not Path(place).exists():
+            raise InputError(
+                f"the study's function was in {place!r}, which does not exist; where its folder was moved, say where "
+                "it is now: --function path/file.py:function."
+            )
         return load_function(described["function"])
     if "synthetic" in described:
         return named_function(described["synthetic"])
