@@ -281,6 +281,30 @@ def test_a_buffer_in_the_folder_is_read_and_a_link_out_of_it_is_not(tmp_path):
     refused(path, "outside its folder", unit=None)
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"sparse": {"count": 1, "indices": {"bufferView": 0}, "values": {"bufferView": 0}}}, "sparse accessors"),
+        ({"componentType": 5123, "normalized": True}, "whole numbers normalized"),
+    ],
+)
+def test_vertices_that_are_not_read_as_they_are_stored_are_refused(tmp_path, change, said):
+    data = json.loads(trimesh.exchange.gltf.export_gltf(trimesh.Scene(box()))["model.gltf"])
+    place = data["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
+    data["accessors"][place] |= change
+    data["buffers"] = [{"byteLength": 4, "uri": "data:application/octet-stream;base64,AAAAAA=="}]
+    (tmp_path / "part.gltf").write_text(json.dumps(data))
+    refused(tmp_path / "part.gltf", said, "export plain floats", unit=None)
+
+
+def test_a_fan_of_triangles_is_refused(tmp_path):
+    data = json.loads(trimesh.exchange.gltf.export_gltf(trimesh.Scene(box()))["model.gltf"])
+    data["meshes"][0]["primitives"][0]["mode"] = 6
+    data["buffers"] = [{"byteLength": 4, "uri": "data:application/octet-stream;base64,AAAAAA=="}]
+    (tmp_path / "part.gltf").write_text(json.dumps(data))
+    refused(tmp_path / "part.gltf", "a fan of triangles", unit=None)
+
+
 def test_options(tmp_path):
     path = stored(tmp_path, box())
     for mass in (0.0, -1.0, np.nan, 1e9):

@@ -84,6 +84,17 @@ def test_normals_of_a_ply(tmp_path):
         ("a.pcd", pcd(bytes([9, 0, 0, 0, 140, 0, 0, 0]) + b"\x00" + bytes(8), 7, "binary_compressed"), "damaged"),
         ("a.pcd", pcd(b"", 7, "binary_zip"), "its data are binary_zip"),
         ("a.pcd", pcd(b"", 0, "binary"), "holds no points"),
+        ("a.pcd", pcd(b"1 2 3 0 0 0 0 0\n" * 6, 7, "ascii"), "6 rows of 8 numbers, its header says 7 of 8"),
+        ("a.pcd", pcd(b"1 2 3 0\n" * 7, 7, "ascii"), "7 rows of 4 numbers, its header says 7 of 8"),
+        ("a.pcd", pcd(b"", 7, "binary").replace(b"0 0 0.5", b"0 0 nan"), "VIEWPOINT is '0 0 nan 1 0 0 0'"),
+        ("a.pcd", pcd(b"", 7, "binary").replace(b"0 0 0.5 1 0 0 0", b"0 0.5"), "VIEWPOINT is '0 0.5'"),
+        ("a.pcd", pcd(b"", 7, "binary").replace(b"SIZE 4 4 4 1 4", b"SIZE 4 4 4"), "has 3 of SIZE for the 5 fields"),
+        ("a.pcd", pcd(b"", 7, "binary").replace(b"TYPE F", b"TYPE C"), "TYPE and SIZE make '4'"),
+        ("a.pcd", pcd(b"", -7, "binary"), "POINTS -7"),
+        ("a.pcd", pcd(b"", 7, "binary").replace(b"FIELDS", b"NAMES"), "fields are not named"),
+        ("a.xyz", b"2\n1 2 3\n4 5 6\n", "line 2 has 3 numbers, those before have 1"),
+        ("a.xyz", b"1 2 3\n4 5 a\n", "line 2 is '4 5 a'"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nend_header\n1\n", "before its 2 rows"),
     ],
 )
 def test_bad_files_are_refused_in_one_line(tmp_path, name, content, said):
@@ -91,6 +102,39 @@ def test_bad_files_are_refused_in_one_line(tmp_path, name, content, said):
     with pytest.raises(InputError, match=said) as error:
         read_cloud(tmp_path / name)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("between", [" ", ";", "; ", "\t"])
+def test_decimal_commas_are_no_columns(tmp_path, between):
+    points = np.round(1e3 * POINTS, 2).astype(float)
+    rows = [between.join(f"{v:g}".replace(".", ",") for v in point) for point in points]
+    (tmp_path / "a.xyz").write_text("# millimeters, 1.5 per pixel\n" + "\n".join(rows))
+    cloud = read_cloud(tmp_path / "a.xyz")
+    assert cloud.points == pytest.approx(points)
+    assert cloud.normals is None
+
+
+@pytest.mark.parametrize("rows", ["1,2,3\n4,5,6\n", "1, 2, 3\n4, 5, 6", "1;2;3\n4;5;6\n", "1.0,2.0,3.0\n4.0,5.0,6.0\n"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_columns_may_be_apart_by_commas(tmp_path, rows, encoding):
+    (tmp_path / "a.xyz").write_bytes(rows.encode(encoding))
+    assert read_cloud(tmp_path / "a.xyz").points.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
+
+
+def test_colors_are_no_normals(tmp_path):
+    colors = np.random.default_rng(1).integers(0, 256, (7, 3))
+    np.savetxt(tmp_path / "a.xyz", np.hstack([POINTS, colors]), fmt="%.9g")
+    cloud = read_cloud(tmp_path / "a.xyz")
+    assert cloud.normals is None
+    assert cloud.points == pytest.approx(POINTS)
+
+
+def test_a_header_may_leave_out_what_follows_from_the_rest(tmp_path):
+    rows = "\n".join(" ".join(map(str, point)) for point in POINTS.tolist())
+    (tmp_path / "a.pcd").write_text(f"COLUMNS x y z\nWIDTH 7\nHEIGHT 1\nDATA ascii\n{rows}\n")
+    cloud = read_cloud(tmp_path / "a.pcd")
+    assert cloud.points == pytest.approx(POINTS)
+    assert cloud.camera is None
 
 
 def test_a_missing_file_and_a_folder(tmp_path):

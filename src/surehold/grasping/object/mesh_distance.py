@@ -77,7 +77,8 @@ def mesh_distance(
     touching = np.flatnonzero(length < _ON_SURFACE)
     if len(touching):
         pseudonormal = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-        nodes[touching, 1:] = igl.signed_distance(points[touching], obj.vertices, faces, pseudonormal)[3]
+        normals = igl.signed_distance(points[touching], obj.vertices, faces, pseudonormal)[3]
+        nodes[touching, 1:] = np.nan_to_num(normals)  # where faces of both directions lie on each other there is none
     return nodes
 
 

@@ -4,7 +4,8 @@ Nothing but a regular file is read: no device, no pipe, no archive. Material fil
 neither looked for nor fetched; of a glTF, a buffer in the same folder or below is read, and no other.
 
 Read although it is not quite what the format says: text in UTF-16, decimal commas, a binary STL followed by other bytes
-or whose header counts no triangles. A note says so.
+or whose header counts no triangles. A note says so. OBJ and PLY have readers of their own (obj_files.py, ply_files.py),
+STL and glTF are read by trimesh.
 """
 
 import base64
@@ -22,11 +23,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
+from surehold.grasping.object.obj_files import read_obj
+from surehold.grasping.object.ply_files import read_ply
+from surehold.grasping.object.polygons import triangles_of
 
 __all__ = ["MESH_FORMATS", "read_mesh"]
 
 MESH_FORMATS: Final = ("stl", "obj", "ply", "gltf", "glb")
 _MOST_BYTES: Final = 2**30
+_NAMES: Final = re.compile(rb"(?m)^[ \t]*(#|o |g |solid|endsolid|mtllib|usemtl|comment|obj_info|format).*$")
 
 
 def read_mesh(file: Path, kind: str) -> tuple[NDArray[np.float64], NDArray[np.int64], list[str]]:
@@ -37,8 +42,6 @@ def read_mesh(file: Path, kind: str) -> tuple[NDArray[np.float64], NDArray[np.in
     InputError
         If the file cannot be read, is no mesh of that kind, or has its triangles where they are not read from.
     """
-    import trimesh
-
     notes: list[str] = []
     content = _bytes(file)
     if content[:4] == b"PK\x03\x04" or content[:2] in (b"\x1f\x8b", b"BZ"):
@@ -51,26 +54,42 @@ def read_mesh(file: Path, kind: str) -> tuple[NDArray[np.float64], NDArray[np.in
         content = _self_contained(file, content, kind)
     elif not _is_binary(content, kind):
         content = _plain_text(content, notes)
-    if kind == "obj":
-        content = b"\n".join(line for line in content.splitlines() if line[:6] not in (b"mtllib", b"usemtl"))
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of coordinates that are not finite, which are refused later
-            scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=_Nothing(), process=False)
-        meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+        if kind == "obj":
+            vertices, faces = read_obj(content)
+        elif kind == "ply":
+            ply = read_ply(content)
+            vertices, faces = ply.vertices, triangles_of(ply.vertices, ply.corners, ply.counts)
+        else:
+            vertices, faces = _by_trimesh(content, kind)
     except MemoryError:
         raise InputError(f"{file.name!r} does not fit into memory; simplify the mesh.") from None
     except Exception as error:  # a damaged file can make the reader stumble anywhere
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        reason = " ".join(str(error).split())[:160].rstrip(".") or type(error).__name__
         raise InputError(f"{file.name!r} cannot be read as {kind.upper()}: {reason}.") from None
-    if not meshes:
+    if not len(faces):
         raise InputError(f"{file.name!r} holds no triangles; export a surface mesh.")
-    if any(mesh.vertices.shape[1:] != (3,) for mesh in meshes):
+    if vertices.shape[1:] != (3,):
         raise InputError(f"{file.name!r} has vertices without three coordinates; export the mesh again.")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(f"{file.name!r} has triangles whose corners are not there (it has {len(vertices)} vertices).")
+    return vertices, faces, notes
+
+
+def _by_trimesh(content: bytes, kind: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices and triangles of STL or glTF, none where there are none."""
+    import trimesh
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of coordinates that are not finite, which are refused later
+        scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=_Nothing(), process=False)
+    meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+    if not meshes:
+        return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
     vertices = np.vstack([np.asarray(mesh.vertices, dtype=np.float64) for mesh in meshes])
     faces = np.vstack([np.asarray(mesh.faces) + start for mesh, start in zip(meshes, starts, strict=True)])
-    return vertices, faces.astype(np.int64), notes
+    return vertices, faces.astype(np.int64)
 
 
 class _Nothing(dict):
@@ -124,7 +143,8 @@ def _plain_text(content: bytes, notes: list[str]) -> bytes:
         content = content.decode(encoding, errors="replace").encode()
         notes.append("its text is UTF-16")
     content = content.removeprefix(b"\xef\xbb\xbf")
-    if re.search(rb"\d,\d", content) and not re.search(rb"\d\.\d", content):
+    numbers = _NAMES.sub(b"", content)  # a name or a version has points of its own
+    if re.search(rb"\d,\d", numbers) and not re.search(rb"\d\.\d", numbers):
         content = content.replace(b",", b".")
         notes.append("its decimal commas are read as points")
     return content
@@ -162,6 +182,7 @@ def _self_contained(file: Path, content: bytes, kind: str) -> bytes:
         packed = [e for e in data.get("extensionsRequired", []) if "compression" in str(e) or "meshopt" in str(e)]
         if packed:
             raise InputError(f"{name!r} is compressed ({packed[0]}); export it without compression.")
+        _check_triangles(name, data)
         for key in ("images", "textures", "materials", "samplers", "extensionsRequired", "extensionsUsed"):
             data.pop(key, None)
         for mesh in data.get("meshes", []):
@@ -177,6 +198,24 @@ def _self_contained(file: Path, content: bytes, kind: str) -> bytes:
     text += b" " * (-len(text) % 4)
     head = b"glTF" + struct.pack("<II", 2, 20 + len(text) + len(binary)) + struct.pack("<I", len(text)) + b"JSON"
     return head + text + binary
+
+
+def _check_triangles(name: str, data: dict[str, Any]) -> None:
+    """Refuse triangles that are stored in a way that is not read: without it they would be others."""
+    accessors = data.get("accessors", [])
+    for mesh in data.get("meshes", []):
+        for primitive in mesh.get("primitives", []):
+            places = [primitive.get("attributes", {}).get("POSITION"), primitive.get("indices")]
+            used = [accessors[i] for i in places if isinstance(i, int) and 0 <= i < len(accessors)]
+            if any("sparse" in accessor for accessor in used):
+                found = "sparse accessors"
+            elif any(accessor.get("normalized") for accessor in used):
+                found = "whole numbers normalized to 0 to 1"
+            elif primitive.get("mode") == 6:
+                found = "a fan of triangles"
+            else:
+                continue
+            raise InputError(f"{name!r} keeps its triangles as {found}, which is not read; export plain floats.")
 
 
 def _buffer(file: Path, uri: str) -> bytes:
