@@ -48,7 +48,7 @@ def _grasp_rate(
     from surehold.cli.compilation import announced
     from surehold.cli.grasp_check import friction_in_words, squeeze_in_words, verdict_in_words
     from surehold.cli.terminal import terminal
-    from surehold.grasping.formats.gripper import stored_grasp
+    from surehold.grasping.formats.gripper import stored_grasp, unknown_frame
     from surehold.grasping.formats.writing import checked_formats, write_grasps
     from surehold.grasping.pose_noise import PoseNoise
     from surehold.grasping.rating import rated_grasps
@@ -111,6 +111,8 @@ def _grasp_rate(
         markup=False,
         soft_wrap=True,
     )
+    if strange := unknown_frame(hand, content):
+        console.print(strange, markup=False, soft_wrap=True)
     console.print(table)
     for verdict in verdicts:
         console.print(verdict, markup=False, soft_wrap=True)

@@ -55,6 +55,25 @@ def test_the_file_of_another_generator_is_read(tmp_path):
     assert (grasp.name, grasp.confidence, grasp.joints) == ("grasp_0", 1.0, {})
 
 
+@pytest.mark.parametrize(("success", "confidence"), [(True, 1.0), (False, 0.0), (1, 1.0), (0, 0.0)])
+def test_success_may_be_counted(tmp_path, success, confidence):
+    grasps = GOOD["grasps"] | {"object_in_gripper": [success]}
+    (tmp_path / "g.json").write_text(json.dumps(GOOD | {"grasps": grasps}))
+    assert read_grasps(tmp_path / "g.json").grasps[0].confidence == confidence
+
+
+def test_a_rounded_transform_is_the_rotation_next_to_it(tmp_path):
+    transform = np.eye(4)
+    transform[:3, :3] = Rotation.from_rotvec([0.3, -0.9, 1.1]).as_matrix()
+    transform[:3, 3] = 0.1, 0.2, 0.3
+    grasps = GOOD["grasps"] | {"transforms": [np.round(transform, 4).tolist()]}
+    (tmp_path / "g.json").write_text(json.dumps(GOOD | {"grasps": grasps}))
+    (grasp,) = read_grasps(tmp_path / "g.json").grasps
+    assert np.linalg.norm(grasp.orientation) == pytest.approx(1.0, abs=1e-12)
+    turned = Rotation.from_quat(grasp.orientation, scalar_first=True) * Rotation.from_matrix(transform[:3, :3]).inv()
+    assert turned.magnitude() < 1e-4
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -64,6 +83,13 @@ def test_the_file_of_another_generator_is_read(tmp_path):
         ('{"grasps": {"transforms": [], "object_in_gripper": [true]}}', "not a GraspGen file"),
         ('{"grasps": {"transforms": [[1]], "object_in_gripper": [true]}}', "4 x 4"),
         (json.dumps(GOOD).replace("1.0, 0.0, 0.0, 0.0", "2.0, 0.0, 0.0, 0.0"), "no rotation"),
+        (
+            json.dumps(GOOD).replace("0.0, 0.0, 0.0, 1.0", "0.1, 0.2, 0.3, 1.0"),
+            "last row .* is 0.1, 0.2, 0.3, 1; .*transposed",
+        ),
+        (json.dumps(GOOD).replace("[true]", '["yes"]'), "object_in_gripper of grasp 0 is 'yes'; give true or false"),
+        (json.dumps(GOOD).replace("[true]", "[2]"), "object_in_gripper of grasp 0 is '2'"),
+        (json.dumps(GOOD).replace("1.0, 0.0, 0.0, 0.0", "-1.0, 0.0, 0.0, 0.0"), "right-handed axes"),
         (json.dumps(GOOD).replace("1.0, 0.0, 0.0, 0.0", "NaN, 0.0, 0.0, 0.0"), "finite"),
         (json.dumps(GOOD).replace("1.0, 0.0, 0.0, 0.0", '"1", 0.0, 0.0, 0.0'), "must be a number"),
         (json.dumps(GOOD).replace('"scale": 1.0', '"scale": -1.0'), "object_scale is -1"),

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from surehold.errors import InputError
 from surehold.grasping import Pose, Simulator, icub_left_hand
 from surehold.grasping.closing.attempt import placed as moved_frames
-from surehold.grasping.formats import GraspFile, read_grasps
+from surehold.grasping.formats import GraspFile, StoredGrasp, read_grasps
 from surehold.grasping.formats.gripper import (
     closing_hand,
     described_gripper,
@@ -20,6 +20,7 @@ from surehold.grasping.formats.gripper import (
     joint_order,
     palm_pose,
     stored_grasp,
+    unknown_frame,
 )
 from surehold.grasping.formats.writing import write_grasps
 from surehold.grasping.hand.configuration import HandConfig
@@ -58,6 +59,38 @@ def grasped(hand):
     center = np.array([0.0, 0.0, top - 0.01])
     pose = Pose.from_matrix(np.column_stack([turn, center - turn @ hand.grasp_center]))
     return simulator, simulator.grasp(pose)
+
+
+@pytest.mark.parametrize("name", ["palm", "wrist", "world", "/World/gripper/wrist"])
+def test_a_file_places_the_body_that_it_names(hand, name):
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    data = mujoco.MjData(model)
+    data.qpos[0] = np.radians(10.0)  # where the tilt rests: at the end of its range next to 0
+    mujoco.mj_kinematics(model, data)
+    body = model.body(name.rpartition("/")[2]).id
+    rotation, place = Rotation.from_rotvec([0.4, -0.2, 1.0]).as_matrix(), np.array([0.1, -0.3, 0.2])
+    quaternion = tuple(Rotation.from_matrix(rotation).as_quat(scalar_first=True).tolist())
+    grasp = StoredGrasp("first", 1.0, tuple(place.tolist()), quaternion)
+    found = palm_pose(hand, GraspFile("cube", name, (grasp,)), grasp)
+    # The palm frame by its description, in MuJoCo's frame of the palm's body, whose axes it has turned about z.
+    palm = model.body("palm").id
+    inside = data.xmat[palm].reshape(3, 3) @ np.array([0.0, 0.01, 0.002]) + data.xpos[palm]
+    seen = data.xmat[body].reshape(3, 3).T @ (inside - data.xpos[body])
+    np.testing.assert_allclose(found.position, rotation @ seen + place, atol=1e-12)
+    along = data.xmat[body].reshape(3, 3).T @ data.xmat[palm].reshape(3, 3) @ [0.0, 0.0, 1.0]
+    np.testing.assert_allclose(found.rotation[:, 2], rotation @ along, atol=1e-12)
+    assert unknown_frame(hand, GraspFile("cube", name, (grasp,))) == ""
+
+
+def test_a_frame_that_the_hand_does_not_have_is_said(hand):
+    grasp = StoredGrasp("first", 1.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    file = GraspFile("cube", "/World/panda/panda_hand", (grasp,))
+    assert "'panda_hand' is none of hand gripper; it is taken for 'palm'" in unknown_frame(hand, file)
+    assert palm_pose(hand, file, grasp) == palm_pose(hand, replace(file, gripper_frame="palm"), grasp)
+    assert "taken for 'icub-left palm'" in unknown_frame(icub_left_hand(), file)
+    assert unknown_frame(hand, GraspFile("cube", "", (grasp,))) == ""
+    with pytest.raises(InputError, match="'l', which a finger of hand 'gripper' moves"):
+        palm_pose(hand, GraspFile("cube", "l", (grasp,)), grasp)
 
 
 def test_frames_and_joints_are_those_of_the_model(hand, tmp_path):

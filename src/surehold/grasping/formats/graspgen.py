@@ -10,7 +10,7 @@ are written beside them and read where they are there.
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -28,6 +28,8 @@ from surehold.grasping.plain_data import grasp_to_dict, regular_bytes
 from surehold.grasping.poses import Pose
 
 __all__ = ["graspgen_file", "read_graspgen_grasps", "write_graspgen_file"]
+
+_ROUNDING: Final = 1e-3  #: of a transform, as of quaternions in files
 
 
 def write_graspgen_file(path: str | Path, file: GraspFile) -> None:
@@ -79,19 +81,14 @@ def graspgen_file(where: str, content: Any) -> GraspFile:
     if not isinstance(names, list) or len(names) != n:
         names = [f"grasp_{i}" for i in range(n)]
     if not isinstance(confidences, list) or len(confidences) != n:
-        confidences = [1.0 if good is True else 0.0 for good in success]
+        confidences = [_success(good, i, where) for i, good in enumerate(success)]
     postures = grasps.get("postures")
     if not isinstance(postures, list) or len(postures) != n:
         postures = [0.0] * n
     stored = []
     for name, confidence, transform, s1 in zip(names, confidences, transforms, postures, strict=True):
         place = f"{where!r}, grasp {str(name)[:60]!r}"
-        if not isinstance(transform, list) or len(transform) not in (3, 4):
-            raise InputError(f"{place}: its transform must be a matrix of 4 x 4 numbers.")
-        try:
-            pose = Pose.from_matrix([numbers(row, 4, f"{place}: a row of its transform") for row in transform])
-        except InputError as error:
-            raise InputError(str(error) if place in str(error) else f"{place}: {error}") from None
+        pose = _pose(transform, place)
         one = StoredGrasp(str(name), confidence, pose.position, pose.quaternion, posture=s1)
         stored.append(checked_grasp(one, place))
     file, scale = obj.get("file") or "", obj.get("scale", 1.0)
@@ -107,3 +104,29 @@ def graspgen_file(where: str, content: Any) -> GraspFile:
             settings=options_of(content, repr(where)),
         )
     )
+
+
+def _success(good: Any, number: int, where: str) -> float:
+    if good is not True and good is not False and good not in (0, 1):
+        raise InputError(f"{where!r}: object_in_gripper of grasp {number} is {str(good)[:40]!r}; give true or false.")
+    return float(good)
+
+
+def _pose(transform: Any, place: str) -> Pose:
+    """Return the pose of a transform; files round it, so that its rotation is one to some digits only."""
+    if not isinstance(transform, list) or len(transform) not in (3, 4):
+        raise InputError(f"{place}: its transform must be a matrix of 4 x 4 numbers.")
+    matrix = np.array([numbers(row, 4, f"{place}: a row of its transform") for row in transform])
+    if np.any(np.abs(matrix[3:] - [0.0, 0.0, 0.0, 1.0]) > _ROUNDING):
+        last = ", ".join(f"{value:g}" for value in matrix[3])
+        raise InputError(
+            f"{place}: the last row of its transform is {last}; it must be 0, 0, 0, 1, and the position stand in the "
+            "last column: is the matrix transposed?"
+        )
+    left, stretch, right = np.linalg.svd(matrix[:3, :3])
+    if np.any(np.abs(stretch - 1.0) > _ROUNDING) or np.linalg.det(matrix[:3, :3]) < 0.0:
+        raise InputError(
+            f"{place}: the 3 x 3 part of its transform is no rotation; its columns must be right-handed axes of "
+            "length 1."
+        )
+    return Pose.from_matrix(np.column_stack([left @ right, matrix[:3, 3]]))

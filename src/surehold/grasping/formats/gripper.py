@@ -1,6 +1,7 @@
 """A hand as files of grasps know it: the frame that is placed, joints by name.
 
-gripper frame   the body of the palm in the model that the hand was read from; the palm frame of a built-in hand
+gripper frame   the body that a file names, by the last word of its path, where the hand's model has it; else the body
+                of the palm in that model, which is what is written; the palm frame of a built-in hand
 root frame      the frame of the model's file; the palm frame of a built-in hand
 """
 
@@ -25,6 +26,7 @@ __all__ = [
     "joint_order",
     "palm_pose",
     "stored_grasp",
+    "unknown_frame",
 ]
 
 Array = NDArray[np.float64]
@@ -79,9 +81,38 @@ def in_root_frame(hand: Hand, file: GraspFile) -> GraspFile:
 def palm_pose(hand: Hand, file: GraspFile, grasp: StoredGrasp) -> Pose:
     """Return the pose of the palm frame in the object's frame of a grasp of a file.
 
-    A file that names no gripper frame places the root frame.
+    A file that names no gripper frame places the root frame; one that names a body of the model places that, and one
+    that names anything else the palm's body (`unknown_frame`).
+
+    Raises
+    ------
+    InputError
+        If the file names a body that a finger moves.
     """
+    name, model = _frame_name(file), hand.model
+    if model is not None and name in model.moved:
+        raise InputError(
+            f"the file's gripper frame is {name!r}, which a finger of hand '{hand.name}' moves; name a body that moves "
+            f"with the palm, such as {model.body!r}."
+        )
+    if model is not None and name in model.frames:
+        return grasp.pose @ Pose.from_matrix(model.frames[name])
     return grasp.pose @ _frame(hand, rooted=not file.gripper_frame)
+
+
+def unknown_frame(hand: Hand, file: GraspFile) -> str:
+    """Return what is to be said of a gripper frame that the hand does not have, "" if it has it or none is named."""
+    name = _frame_name(file)
+    own = [f"{hand.name} palm"] if hand.model is None else [*hand.model.frames, *hand.model.moved]
+    if not name or name in own:
+        return ""
+    palm = own[0] if hand.model is None else hand.model.body
+    return f"The file's gripper frame {name!r} is none of hand {hand.name}; it is taken for {palm!r}."
+
+
+def _frame_name(file: GraspFile) -> str:
+    """Return the name of the gripper frame without the path that Isaac Sim puts before it."""
+    return file.gripper_frame.rstrip("/").rpartition("/")[2]
 
 
 def joint_order(hand: Hand) -> tuple[str, ...]:

@@ -55,6 +55,8 @@ class HandModel(NamedTuple):
     in_root: Array  #: (3, 4) palm frame in the frame of the model's file
     joints: tuple[str, ...]  #: all joints that turn or slide, in the order of the model
     rest: tuple[float, ...]  #: where those are that no finger moves [rad or m]
+    frames: Mapping[str, Array]  #: (3, 4) palm frame in the frame of each body that no finger moves, at rest
+    moved: tuple[str, ...]  #: bodies that fingers move
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,17 +63,23 @@ class RestingModel:
 
     def source(self, file: str) -> HandModel:
         """Return the names and frames of the model at rest."""
-        rotation = self.data.xmat[self.palm_body].reshape(3, 3)
-        inside = np.column_stack([rotation.T @ self.turn, rotation.T @ (self.origin - self.data.xpos[self.palm_body])])
+        frames = {name: self._palm_in(b) for name, b in self.body_ids.items() if b not in self.of_body}
         order = sorted((int(self.model.jnt_qposadr[j]), j) for j in self.joint_ids.values() if self.moves(j))
         return HandModel(
             file,
             self.config.palm.body,
-            inside,
+            frames[self.config.palm.body],
             np.column_stack([self.turn, self.origin]),
             tuple(self.joint_names[j] for _, j in order),
             tuple(float(self.data.qpos[place]) for place, _ in order),
+            frames,
+            tuple(self.body_names[b] for b in sorted(self.of_body)),
         )
+
+    def _palm_in(self, body: int) -> Array:
+        """Return the palm frame (3, 4) in the frame of a body."""
+        rotation = self.data.xmat[body].reshape(3, 3)
+        return np.column_stack([rotation.T @ self.turn, rotation.T @ (self.origin - self.data.xpos[body])])
 
     def moves(self, j: int) -> bool:
         """Whether a joint turns or slides about one axis."""

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 _NAMES: Final = "char uchar short ushort int uint float double int8 uint8 int16 uint16 int32 uint32 float32 float64"
 _KINDS: Final = "i1 u1 i2 u2 i4 u4 f4 f8 i1 u1 i2 u2 i4 u4 f4 f8"
-_TYPES: Final = dict(zip(_NAMES.split(), _KINDS.split(), strict=True))
+_TYPES: Final[dict[str, str]] = dict(zip(_NAMES.split(), _KINDS.split(), strict=True))
 _LETTERS: Final = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
 _ORDERS: Final = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNERS: Final = ("vertex_indices", "vertex_index")
