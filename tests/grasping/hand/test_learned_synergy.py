@@ -109,6 +109,8 @@ def test_a_column_that_is_no_joint_is_named(tmp_path):
         ("a,b\n1,x\n", "row 2, b: 'x' is no finite number"),
         ("a,b\n1,nan\n", "no finite number"),
         (",".join(f"j{i}" for i in range(201)), "up to 200 joints"),
+        ("a,b\n\n1,2\n\n3,x\n", "row 5, b: 'x' is no finite number"),
+        ("a,b\n1,2\n\n3\n", "row 4 has 1 entries"),
     ],
 )
 def test_bad_recordings_are_refused(tmp_path, text, words):
@@ -122,6 +124,18 @@ def test_recordings_of_other_shapes_are_read(tmp_path):
     found = read_postures(tmp_path / "p.csv", degrees=True)
     assert (found.joints, found.grasps) == (("b", "a"), ("power", "pinch"))
     np.testing.assert_allclose(found.angles, [[np.pi / 2, 0], [np.pi, np.pi / 4]])
+
+
+@pytest.mark.parametrize("end", ["\n", "\r", "\r\n"])
+def test_semicolons_leave_commas_to_the_numbers(tmp_path, end):
+    (tmp_path / "p.csv").write_bytes(end.join(["a;b", "0,5;1", "-1,25;0,75"]).encode())
+    np.testing.assert_array_equal(read_postures(tmp_path / "p.csv").angles, [[0.5, 1.0], [-1.25, 0.75]])
+
+
+def test_radians_are_not_taken_for_degrees(tmp_path):
+    (tmp_path / "p.csv").write_text("a,b\n0.1,0.2\n1.2,1.4\n")
+    with pytest.raises(InputError, match=r"largest angle is 1.4, .* leave --degrees"):
+        read_postures(tmp_path / "p.csv", degrees=True)
 
 
 def test_degrees_are_of_joints_that_turn(tmp_path):
@@ -142,6 +156,11 @@ def test_too_little_is_refused():
         learn_synergy(["index"], np.eye(2)[:, :1], hand, 1)
     with pytest.raises(InputError, match="do not differ"):
         learn_synergy(hand.joint_names[:2], np.ones((5, 2)), hand, 1)
+    for angles in (np.full((3, 2), np.nan), np.eye(3), np.ones(4)):
+        with pytest.raises(InputError, match="give one finite number for each"):
+            learn_synergy(hand.joint_names[:2], angles, hand, 1)
+    with pytest.raises(InputError, match="each joint once"):
+        learn_synergy(hand.joint_names[:1] * 2, np.eye(3)[:, :2], hand, 1)
     with pytest.raises(InputError, match="components are 3; 3 postures of 2 joints give 1 to 2"):
         learn_synergy(hand.joint_names[:2], np.eye(3)[:, :2], hand, 3)
 

@@ -7,6 +7,7 @@ import trimesh
 from surehold.errors import InputError
 from surehold.grasping.hand.configuration import HandConfig
 from surehold.grasping.hand.files import load_hand
+from surehold.grasping.hand.proposal import propose_hand
 
 CONFIG = HandConfig.model_validate(
     {
@@ -113,3 +114,20 @@ def test_a_mesh_that_is_none(tmp_path, name, words):
 def test_a_file_that_is_none(tmp_path, text, words):
     with pytest.raises(InputError, match=words):
         load_hand(written(tmp_path, "box.stl", text), CONFIG)
+
+
+@pytest.mark.parametrize("leader", ["a2", "", "c1"])
+def test_a_joint_that_mimics_none_is_refused(tmp_path, leader):
+    """MuJoCo passes over such a mimic, and half of a gripper stayed where it was."""
+    text = urdf('<box size=".02 .016 .06"/>').replace("</joint></robot>", f'<mimic joint="{leader}"/></joint></robot>')
+    path = written(tmp_path, "meshes/box.stl", text)
+    with pytest.raises(InputError, match=f"joint 'c1' mimics '{leader}': .*a1"):
+        load_hand(path, CONFIG)
+
+
+def test_limits_in_degrees_are_refused(tmp_path):
+    path = written(tmp_path, "meshes/box.stl", urdf('<box size=".02 .016 .06"/>').replace('"1.5"', '"85.9"'))
+    with pytest.raises(
+        InputError, match=r"'a1' of .* turns from 0 to 85.9 rad, several turns; are its limits in degrees"
+    ):
+        propose_hand(path)

@@ -58,10 +58,15 @@ def learn_synergy(joints: Sequence[str], angles: Array, hand: Hand, components: 
     Raises
     ------
     InputError
-        If a joint is none of the hand or cannot be where it is said to be, there are too few postures for so many
-        components, or all are equal.
+        If a joint is none of the hand, given twice, or cannot be where it is said to be, a number is missing or not
+        finite, there are too few postures for so many components, or all are equal.
     """
     x = np.asarray(angles, dtype=np.float64)
+    if x.shape[1:] != (len(joints),) or not np.all(np.isfinite(x)) or len(set(joints)) != len(joints):
+        raise InputError(
+            f"postures of shape {x.shape} for {len(set(joints))} different joints; give one finite number for each, "
+            "(postures, joints), and each joint once."
+        )
     places = _places(hand, joints)
     _check_units(x, hand, joints, places)
     most = min(MOST, len(joints), len(x) - 1)

@@ -5,11 +5,11 @@
     0.10,0.22,0.95,pinch
 
 The order of the columns does not matter, and joints that do not move may be missing. A column `grasp` names the grasps.
-Angles are in radians, or in degrees if it is said; shifts of sliding joints are in meters.
+Angles are in radians, or in degrees if it is said; shifts of sliding joints are in meters. Columns apart by semicolons
+may have decimal commas.
 """
 
 import csv
-import io
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -40,20 +40,22 @@ def read_postures(path: str | Path, degrees: bool = False, hand: Hand | None = N
     Raises
     ------
     InputError
-        If the file cannot be read, a joint is given twice or is none of the hand, a row is too short or too long, or an
-        entry is no finite number; the message names row and column.
+        If the file cannot be read, a joint is given twice or is none of the hand, a row is too short or too long, an
+        entry is no finite number, or all angles in degrees are so small that they are radians; the message names row
+        and column.
     """
     where = str(path)
     try:
         text = regular_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{where!r} is not a text file in UTF-8; give a CSV file.") from None
-    separator = ";" if ";" in text.partition("\n")[0] else ","
+    separator = ";" if ";" in (text.splitlines() or [""])[0] else ","
     try:
-        rows = [row for row in csv.reader(io.StringIO(text), delimiter=separator) if row]
+        reader = csv.reader(text.splitlines(), delimiter=separator)
+        lines = [(reader.line_num, row) for row in reader if row]
     except csv.Error as error:
         raise InputError(f"{where!r} is no CSV file: {error}.") from None
-    names = [name.strip() for name in rows[0]] if rows else []
+    names = [name.strip() for name in lines[0][1]] if lines else []
     joints = [name for name in names if name != _LABEL]
     if not joints or len(names) > _MOST_COLUMNS or len(set(names)) != len(names) or "" in names:
         raise InputError(f"{where!r}: its first row must name up to {_MOST_COLUMNS} joints, each once.")
@@ -64,24 +66,30 @@ def read_postures(path: str | Path, degrees: bool = False, hand: Hand | None = N
             raise InputError(
                 f"{where!r}: column {name[:40]!r} is no joint of the hand; leave it out, or mend it: {unknown}"
             )
-    angles, grasps = np.empty((len(rows) - 1, len(joints))), []
-    for i, row in enumerate(rows[1:]):
+    angles, grasps = np.empty((len(lines) - 1, len(joints))), []
+    for i, (line, row) in enumerate(lines[1:]):
         if len(row) != len(names):
-            raise InputError(f"{where!r}, row {i + 2} has {len(row)} entries; the first row names {len(names)}.")
+            raise InputError(f"{where!r}, row {line} has {len(row)} entries; the first row names {len(names)}.")
         k = 0
         for name, entry in zip(names, row, strict=True):
             if name == _LABEL:
                 grasps.append(entry.strip())
                 continue
             try:
-                angles[i, k] = float(entry)
+                angles[i, k] = float(entry.replace(",", ".") if separator == ";" else entry)
             except ValueError:
                 angles[i, k] = np.nan
             if not np.isfinite(angles[i, k]):
-                raise InputError(f"{where!r}, row {i + 2}, {name}: {entry[:40]!r} is no finite number.")
+                raise InputError(f"{where!r}, row {line}, {name}: {entry[:40]!r} is no finite number.")
             k += 1
     if degrees:
         sliding = [] if hand is None else np.array(hand.joint_names)[hand.slides.ravel()].tolist()
         turning = [k for k, name in enumerate(joints) if name not in sliding]
+        largest = float(np.abs(angles[:, turning]).max(initial=0.0))
+        if 0.0 < largest <= 2.0 * np.pi:  # a hand that closes turns farther than so many degrees
+            raise InputError(
+                f"{where!r}: its largest angle is {largest:.4g}, which is hardly a motion in degrees; leave --degrees "
+                "(of read_postures degrees=True) out if it is in radians."
+            )
         angles[:, turning] = np.radians(angles[:, turning])
     return Postures(tuple(joints), angles, tuple(grasps))

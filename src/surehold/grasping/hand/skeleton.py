@@ -24,6 +24,7 @@ _LONGER: Final = 1.3  # times as far reaches a finger as the bar that is coupled
 _MOST_OF_ALL: Final = 300  # joints of a robot whose hand is looked for
 _MOST_JOINTS, _MOST_CHAIN, _MOST_FINGERS = 32, 8, 8
 _TINY: Final = 0.1  # rad; a hand whose joints all turn less than that was written in radians and read in degrees
+_HUGE: Final = 4.0 * np.pi  # rad; a joint that turns farther was written in degrees and read in radians
 _WORDS: Final = {
     "thumb": "thumb|(?<![a-z])th(?=j|base|prox|hub|mid|dis)",
     "index": "index|(?<![a-z])ff(?=j|kn|prox|mid|dis)",
@@ -123,6 +124,13 @@ class _Tree:
             raise InputError(
                 f"the joints of {self.file!r} turn by {most:.2g} degrees at most; if its angles are in radians, write "
                 '<compiler angle="radian"/> into the model: MJCF counts in degrees otherwise.'
+            )
+        far = max(hinges, key=lambda j: np.ptp(self.model.jnt_range[j]), default=-1)
+        if far >= 0 and np.ptp(self.model.jnt_range[far]) > _HUGE:
+            low, high = self.model.jnt_range[far]
+            raise InputError(
+                f"joint {self._label(far)!r} of {self.file!r} turns from {low:.4g} to {high:.4g} rad, several turns; "
+                "are its limits in degrees? A URDF counts in radians, and a joint without limits has none."
             )
 
     def _label(self, j: int) -> str:

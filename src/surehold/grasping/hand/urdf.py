@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from surehold.errors import InputError
+from surehold.errors import InputError, unknown_name
 from surehold.grasping.object.mesh_reading import MESH_FORMATS, read_mesh
 from surehold.grasping.plain_data import regular_bytes
 
@@ -24,7 +24,7 @@ def read_urdf(path: Path) -> tuple[str, dict[str, bytes]]:
     Raises
     ------
     InputError
-        If the file cannot be read, is no XML, or a mesh is not found or is none.
+        If the file cannot be read, is no XML, a joint mimics one that is not there, or a mesh is not found or is none.
     """
     content = regular_bytes(path)
     if b"<!ENTITY" in content:  # which can grow without bound
@@ -35,6 +35,7 @@ def read_urdf(path: Path) -> tuple[str, dict[str, bytes]]:
         raise InputError(f"{str(path)!r} is not a model that MuJoCo can read: {error}.") from None
     if any("xacro" in element.tag for element in robot.iter()):
         raise InputError(f"{str(path)!r} is a xacro file; make a URDF of it: xacro {path.name} > plain.urdf.")
+    _check_mimics(robot, path)
     folder = path.resolve().parent
     for compiler in robot.iterfind("mujoco/compiler"):
         folder = folder / compiler.attrib.pop("meshdir", "")
@@ -50,6 +51,20 @@ def read_urdf(path: Path) -> tuple[str, dict[str, bytes]]:
                 assets[meshes[file]] = _triangles(file)
             mesh.set("filename", meshes[file])
     return ElementTree.tostring(robot, encoding="unicode"), assets
+
+
+def _check_mimics(robot: ElementTree.Element, path: Path) -> None:
+    """Refuse a joint that follows none: MuJoCo would leave it where it is."""
+    names = [joint.get("name", "") for joint in robot.iterfind("joint")]
+    for joint in robot.iterfind("joint"):
+        for mimic in joint.iterfind("mimic"):
+            leader = mimic.get("joint", "")
+            if leader not in names or leader == joint.get("name"):
+                others = [name for name in names if name != joint.get("name")]
+                raise InputError(
+                    f"{str(path)!r}: joint {joint.get('name')!r} mimics {leader!r}: "
+                    f"{unknown_name('joint', leader, others)}"
+                )
 
 
 def _found(name: str, urdf: Path, folder: Path) -> Path:
