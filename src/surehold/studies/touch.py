@@ -11,7 +11,8 @@ from typing import Any, Final
 import numpy as np
 from optuna.trial import FrozenTrial, TrialState
 
-from surehold.errors import InputError
+from surehold.errors import InputError, SureholdError
+from surehold.grasping.shape.implicit_surface import Observations
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.problems.grasp.description import described_grasp
 from surehold.problems.grasp.exploration import Exploration, belief_of_size
@@ -21,6 +22,8 @@ from surehold.studies.recommendation import StudyRecommendation
 from surehold.studies.search_space import SearchSpace
 
 __all__ = ["TouchedShape"]
+
+_SHAPES: Final = 4  #: that are drawn to see whether an object is left
 
 
 class TouchedShape:
@@ -101,7 +104,23 @@ class TouchedShape:
             run.restore(np.empty((0, self.problem.box.dimension)), np.empty(0), felt)
             surface = run.belief.surface
         checked_against(surface, found, before=felt)
+        self._check_room([*felt, found])
         return dict(told)
+
+    def _check_room(self, felt: Sequence[Observations]) -> None:
+        """Refuse what leaves no shape: nothing could be asked of the study afterwards."""
+        run = Exploration(self.problem, self._belief, self._noise)
+        try:
+            run.restore(np.empty((0, self.problem.box.dimension)), np.empty(0), felt)
+            possible = run.belief.objects(_SHAPES, np.random.default_rng(self._seed))
+        except SureholdError:
+            possible = []
+        if len(possible) < 2:  # the mean, and a shape that keeps out of all that is free
+            raise InputError(
+                "with these contacts no object is left: free balls take its whole room, or contacts contradict each "
+                "other; leave out balls that reach beyond what the hand swept, give meters in the object's frame, and "
+                "normals out of the object."
+            )
 
     def pose(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """Return where the palm goes, in the object's frame, and the posture."""

@@ -104,3 +104,11 @@ def test_no_draw_fills_what_is_free(belief):
     floor = 0.012 - np.linalg.norm(belief.grid.nodes - place, axis=1)
     changed = np.array(lifted) != np.array(draws)
     assert np.array(lifted)[changed] == pytest.approx(np.broadcast_to(floor, changed.shape)[changed], abs=1e-12)
+
+
+def test_draws_that_enclose_nothing_are_no_shapes(belief):
+    """Space that draws know to be free, but the mean does not, takes all of them: the draws are lifted to it."""
+    lifted = replace(belief, free=np.array([[0.0, 0.0, 0.0, 0.5]]))
+    assert np.all(lifted.values(3, np.random.default_rng(0))[1:] > 0.0)
+    (mean,) = lifted.objects(3, np.random.default_rng(0))
+    assert mean.mass == pytest.approx(belief.mean_object().mass)

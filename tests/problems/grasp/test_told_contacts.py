@@ -81,3 +81,15 @@ def test_a_study_refuses_them_when_they_are_told():
     assert shape.checked({"contacts": [SIDE]}, []) == {"contacts": [SIDE]}
     with pytest.raises(InputError, match="inside a free ball that was told before"):
         shape.checked({"contacts": [SIDE]}, [known])
+
+
+def test_a_study_refuses_what_leaves_no_object():
+    """The answer was taken, and nothing could be asked of the study any more."""
+    pytest.importorskip("optuna")
+    from surehold.studies.touch import TouchedShape
+
+    shape = TouchedShape({"box": [0.06, 0.06, 0.2], "facet": "right-front"}, InputNoise.unit(0.03), 0)
+    with pytest.raises(InputError, match="no object is left: free balls take its whole room"):
+        shape.checked({"contacts": [], "free": [[0.0, 0.0, 0.0, 0.3]]}, [])
+    beside = {"contacts": [], "free": [[0.1, 0.0, 0.0, 0.05]]}
+    assert shape.checked(beside, []) == beside

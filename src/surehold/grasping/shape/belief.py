@@ -88,14 +88,18 @@ class ShapeBelief:
     def objects(self, draws: int = 0, rng: np.random.Generator | None = None) -> list[GraspObject]:
         """Return the mean shape and draws of it as objects with their distances, all in the same frame and box axes.
 
+        A draw that encloses nothing is no shape of an object that is there, and is left out.
+
         Raises
         ------
         SureholdError
-            If a shape has no inside.
+            If the mean shape has no inside.
         """
         known = self.surface.observations
         measured = self.grid.nearest(known.points[known.values == 0.0])
-        return [self._object(one_piece(values, measured)) for values in self.values(draws, rng)]
+        mean, *drawn = self.values(draws, rng)
+        possible = [mean, *(values for values in drawn if np.any(values < 0.0))]
+        return [self._object(one_piece(values, measured)) for values in possible]
 
     def mean_object(self) -> GraspObject:
         """Return the mean shape as an object."""

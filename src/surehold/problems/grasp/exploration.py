@@ -42,6 +42,7 @@ _SPREAD: Final = (0.25, 0.7)  # of the shape about the box: deviation and length
 _CELL: Final = 0.004  # m, of a grid of at most
 _NODES: Final = 100_000  # nodes: each trial makes some shapes anew
 _FREE_SPACING: Final = 0.008  # free points in the same cube of this edge count once [m]
+_MOST_FELT: Final = 600  # contacts that the surface is learnt from: each is four observations, and costs are their cube
 _GROWTH: Final = 1.0  # of the grid beyond the box, in deviations: what is told of a box is nearly right
 
 
@@ -79,6 +80,15 @@ def _of_prior(box: PriorShape, cell: float, name: str, mass: float | None, frict
     surface = surface_of(box, Observations(), _SPREAD[0] * size, _SPREAD[1] * size)
     grid = grid_of(surface, cell, _GROWTH, _NODES)
     return ShapeBelief(surface, grid, name, mass, friction)
+
+
+def _evenly(felt: Observations) -> Observations:
+    """Return the contacts, or, of more than `_MOST_FELT`, one in each cube of a grid."""
+    kept, edge = np.arange(len(felt.points)), 0.002
+    while len(kept) > _MOST_FELT:
+        kept, edge = spaced(felt.points, edge), 1.2 * edge
+    names = ("points", "values", "noise", "slope_points", "slopes", "slope_noise")
+    return Observations(**{name: getattr(felt, name)[kept] for name in names})
 
 
 class Exploration:
@@ -120,7 +130,10 @@ class Exploration:
         self.belief = belief
         self.X: Array = np.empty((0, problem.box.dimension))  #: trials told, in the units of the box
         self.y: Array = np.empty(0)  #: their qualities
-        self._felt = belief.surface.observations  # all of it, bounds apart
+        self._known, self._felt = (
+            belief.surface.observations,
+            Observations(),
+        )  # before the first touch; since, bounds apart
         self._seen, self._free = belief.free, np.empty((0, 4))
 
     def ask(self, pending: Array | None = None) -> Array:
@@ -152,7 +165,7 @@ class Exploration:
             self._free = np.vstack([self._free, each.free[near]])  # active anew: what is learnt may free them
         self._free = self._free[spaced(self._free[:, :3], _FREE_SPACING)]
         if felt:
-            told = replace(self._felt, free=self._free)
+            told = replace(self._known + _evenly(self._felt), free=self._free)
             self.belief = self.belief.knowing(told, np.vstack([self._seen, self._free]))
 
     def recommend(self, tried: bool = False) -> ExploredGrasp:
