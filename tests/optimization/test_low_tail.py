@@ -123,3 +123,21 @@ def test_where_values_stay_as_they_are_one_model_serves_both():
         trials.tell(x, y, False, None)
     model = assembled(box, sh.Optimizer(box)._settings).model
     assert model.posterior_of_search(trials) is model.posterior(trials)
+
+
+def test_it_rests_on_the_trials_and_not_on_when_it_was_first_looked_at():
+    """A trial that fills the gap below the others makes an early outlier none, which counts among those that judge."""
+    rng = np.random.default_rng(1)
+    X = rng.random((32, 1))
+    y = np.sin(rng.uniform(3.0, 9.0) * X[:, 0])
+    y[4] = -30.0
+    running, rebuilt = (sh.Optimizer(sh.Box({"x": (0.0, 1.0)}), n_initial=2, seed=0) for _ in range(2))
+    for x, value in zip(X, y, strict=True):
+        running.tell(x, value)
+    assert running._trials.outliers[4]
+    running.forget(running.ask())
+    running.tell([0.99], -9.0)
+    assert not running._trials.outliers[4]
+    rebuilt.restore(running.X, running.y)
+    values = [o._model.values_of_search(o._trials) for o in (running, rebuilt)]
+    assert np.array_equal(*values)

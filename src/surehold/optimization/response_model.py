@@ -116,7 +116,7 @@ class ResponseModel:
         self._told: Final = told
         self._screened: Final = screened
         self._compressed: Final = compressed
-        self._low_tail: tuple[int, LowTail | None] | None = None
+        self._low_tail: tuple[bytes, LowTail | None] | None = None  # and the values that it rests on
         self._cache: dict[bool, tuple[int, Posterior]] = {}  # by whether deep values are compressed
 
     def forget(self) -> None:
@@ -144,11 +144,12 @@ class ResponseModel:
         told = trials.successful
         if not self._compressed or not told.any():
             return None
-        k = learnt_from(int(told.sum()))
-        if self._low_tail is None or self._low_tail[0] != k:
+        values = trials.modelled[told]
+        judging = values[: learnt_from(len(values))].tobytes()  # a further trial can make an outlier none
+        if self._low_tail is None or self._low_tail[0] != judging:
             background.wait()
             with computing():
-                self._low_tail = k, low_tail_of(trials.reached[told], trials.modelled[told])
+                self._low_tail = judging, low_tail_of(trials.reached[told], values)
         return self._low_tail[1]
 
     def _posterior(self, trials: Trials, tail: LowTail | None) -> Posterior:
