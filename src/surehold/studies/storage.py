@@ -24,7 +24,6 @@ from urllib.parse import quote
 
 from optuna.exceptions import DuplicatedStudyError, StorageInternalError
 from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, get_storage
-from optuna.storages.journal._storage import NOT_FOUND_MSG
 
 from surehold.errors import InputError
 from surehold.studies.journal import READ_ONLY, REPLACED, Journal
@@ -36,6 +35,7 @@ JOURNAL: Final = "journal.log"
 _SCHEMES: Final = "a journal file (path or journal:///path), sqlite:///file.db, postgresql://user@host/database, memory"
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _TELLING: Final = ".telling"  # ending of the file that is locked while trials are told
+_NOT_FOUND: Final = "Record does not exist."  # Optuna's words for a study or a trial that is not there
 _SQLITE_PATIENCE: Final = 30.0  # seconds to wait for another process' write; ?timeout= in the URL overrides it
 
 
@@ -102,7 +102,7 @@ class Storage:
             hint = "; copy it to a place that can be written" if error.errno in READ_ONLY else ""
             raise StorageFailure(f"storage {self.shown} cannot be used: {error.strerror or error}{hint}.") from error
         except KeyError as error:
-            if error.args != (NOT_FOUND_MSG,):  # in Optuna's words: deleted by its dashboard, or an older copy is there
+            if error.args != (_NOT_FOUND,):  # in Optuna's words: deleted by its dashboard, or an older copy is there
                 raise
             raise StorageFailure(
                 f"storage {self.shown} lacks the study, or a trial, that was in it when this program opened it; put "
