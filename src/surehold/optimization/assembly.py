@@ -20,7 +20,8 @@ from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.argument_kinds import check_kinds
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.input import Region, region_of
-from surehold.optimization.lattice import Lattice, lattice_of, places_of
+from surehold.optimization.known_coordinates import places_of
+from surehold.optimization.lattice import Lattice, lattice_of
 from surehold.optimization.limits import Limit, limits_of
 from surehold.optimization.noise.input_noise import InputNoise, noise_of_coordinates
 from surehold.optimization.requirements import Requirements

@@ -7,21 +7,20 @@ have been perturbed.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import ROUNDED
-from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
+from surehold.optimization.known_coordinates import fixed_of
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions, means
 
 Allowed = Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None
 
 _SOME: Final = 1024  # random points among which one is sought that has not been tried
 
-__all__ = ["Fixed", "Lattice", "LatticePosterior", "fixed_of", "lattice_of", "places_of"]
+__all__ = ["Lattice", "LatticePosterior", "lattice_of"]
 
 
 @dataclass(frozen=True)
@@ -64,33 +63,6 @@ def _key(point: NDArray[np.float64]) -> bytes:
     return (point + 0.0).tobytes()  # -0.0 is 0.0
 
 
-class Fixed(NamedTuple):
-    """Coordinates of the cube that keep their values."""
-
-    held: NDArray[np.bool_]
-    """which they are, (d,)"""
-    values: NDArray[np.float64]
-    """(d,); nan of the others"""
-
-    def keeps(self, U: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which points U (q, d) have these values, but for what a rig rounds: (q,)."""
-        return np.all((np.abs(U - self.values) <= ROUNDED) | ~self.held, axis=1)
-
-
-def fixed_of(box: Box, fixed: Mapping[str, Any] | None) -> Fixed | None:
-    """Return the coordinates of variables that have fixed values {name: value}; None where there are none.
-
-    Raises InputError as `lattice_of` does.
-    """
-    if not fixed:
-        return None
-    values = places_of(box, "fixed", fixed)
-    held = ~np.isnan(values)
-    if held.all():
-        raise InputError("every variable is fixed; there is nothing to optimize.")
-    return Fixed(held, values)
-
-
 def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | None:
     """Return the points of a box that can be tried, those at which variables have fixed values {name: value}.
 
@@ -111,30 +83,6 @@ def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | No
         return np.where(held, values, U if lattice is None else lattice.snap(U))
 
     return Lattice(snap, ~held if lattice is None else lattice.smooth & ~held)
-
-
-def places_of(box: Box, argument: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Return where values {name: value} are in the unit cube, (d,); nan in coordinates of other variables.
-
-    Raises
-    ------
-    InputError
-        That names the argument, if a name is unknown, nobody sets that variable, or a value cannot be tried.
-    """
-    variables = {variable.name: variable for variable in box.variables}
-    kept: dict[str, Any] = {}
-    for name, value in values.items():
-        if name not in variables:
-            raise unknown_name(f"{argument} variable", name, variables)
-        if box.uncontrolled is not None and box.uncontrolled.held[box.columns(name)].any():
-            raise InputError(f"{argument} names '{name}', which is uncontrolled: nobody sets it; leave it out.")
-        kept[name] = variables[name].checked(value, argument)
-    x = box.points({**box.as_dict(box.from_unit(np.full(box.dimension, 0.5))), **kept})
-    places = np.full(box.dimension, np.nan)
-    for name in kept:
-        own = box.columns(name)
-        places[own] = np.clip(box.to_unit(x), 0.0, 1.0)[own]
-    return places
 
 
 class LatticePosterior:

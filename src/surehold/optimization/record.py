@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.errors import InputError, unknown_name
 from surehold.optimization import saving
 from surehold.optimization.box import Box
-from surehold.optimization.lattice import fixed_of
+from surehold.optimization.known_coordinates import fixed_of
 from surehold.optimization.limits import Limit
 from surehold.optimization.noise.estimation import noise_from_reached, noise_from_repeats
 from surehold.optimization.noise.input_noise import InputNoise

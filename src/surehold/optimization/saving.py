@@ -13,7 +13,7 @@ from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.linear import Linear
-from surehold.optimization.lattice import fixed_of
+from surehold.optimization.known_coordinates import fixed_of
 from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.trials import Trials

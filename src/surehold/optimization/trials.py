@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from surehold.defaults import ROUNDED
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
-from surehold.optimization.lattice import Fixed
+from surehold.optimization.known_coordinates import Fixed
 from surehold.optimization.limits import Limit, checked_outputs
 from surehold.optimization.stored_trials import checked_columns
 from surehold.optimization.trial_inputs import check_levels, check_place, trial_input, trial_inputs

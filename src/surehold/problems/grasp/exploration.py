@@ -7,7 +7,8 @@
     shape        a(x) = sum_c sigma(c) over the contacts c of x on the mean shape   where a touch tells most
     answer       the x, of those tried and those thought good, of highest mean_e mean_b q(x + e, b)
 
-`ask` takes the highest a(x) of a Sobol sequence and of steps around what is best so far; `tell` adds what was felt.
+`ask` takes the highest a(x) of a Sobol sequence, two of three points of which keep the problem's guess, and of steps
+around what is best so far; `tell` adds what was felt.
 (Dragiev, Toussaint and Gienger 2013; Castanheira and others 2018 with the unscented criterion in place of the mean.)
 """
 
@@ -23,7 +24,9 @@ from surehold.grasping.object.model import GraspObject
 from surehold.grasping.shape.belief import ShapeBelief, grid_of
 from surehold.grasping.shape.implicit_surface import Observations, spaced, surface_of
 from surehold.grasping.shape.prior import PriorShape
+from surehold.optimization.known_coordinates import places_of
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.strategy.initial_design import drawn_to
 from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.perturbation import perturbed_points
 
@@ -127,6 +130,7 @@ class Exploration:
         if goal not in GOALS:
             raise unknown_name("goal", goal, GOALS)
         self._problem, self._noise, self._goal, self._shapes, self._seed = problem, noise, goal, shapes, seed
+        self._guess: Final = places_of(problem.box, "guess", problem.guess)
         self.belief = belief
         self.X: Array = np.empty((0, problem.box.dimension))  #: trials told, in the units of the box
         self.y: Array = np.empty(0)  #: their qualities
@@ -197,7 +201,7 @@ class Exploration:
 
         box = self._problem.box
         rng = np.random.default_rng([self._seed, 1, len(self.X)])
-        spread = qmc.Sobol(box.dimension, rng=rng).random_base2(6)[:_CANDIDATES]
+        spread = drawn_to(self._guess, qmc.Sobol(box.dimension, rng=rng).random_base2(6)[:_CANDIDATES])
         if not len(self.X):
             return box.from_unit(spread)
         best = box.to_unit(self.X[np.argsort(-self.y, kind="stable")[:2]])
