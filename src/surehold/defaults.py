@@ -27,7 +27,7 @@ DESIGN_LEAST: Final = 6
 DESIGN_MOST: Final = 20
 DESIGN_VARIABLES_PER_MORE: Final = 5
 #: Of so many trials of the initial design all but one keep the values that `Optimizer(guess=)` names.
-#: python -m benchmarks.robust_grasps --methods guess; other numbers were never measured.
+#: python -m benchmarks.guess, and benchmarks.robust_grasps --methods guess; other numbers were never measured.
 GUESS_TURN: Final = 3
 
 # --- which tried inputs are the best ones -----------------------------------------------------------------------------
