@@ -85,12 +85,21 @@ def test_choices_carry_no_noise():
     assert np.count_nonzero(np.diag(unit)) == 5
 
 
+def test_correlated_noise_is_of_the_numbers_and_choices_carry_none():
+    covariance = 1e-4 * (np.eye(5) + 0.3)
+    unit = noise_of_coordinates(sh.InputNoise(covariance=covariance), SPACE.box).unit_covariance(SPACE.box)
+    numbers = SPACE.box.numbers
+    own = [SPACE.box.names.index(name) for name in numbers.names]
+    np.testing.assert_allclose(unit[np.ix_(own, own)], covariance / np.outer(numbers.widths, numbers.widths))
+    assert np.count_nonzero(unit) == 25
+
+
 @pytest.mark.parametrize(
     ("noise", "message"),
     [
         (sh.InputNoise({"dx": 0.003}), "says nothing about"),
         (sh.InputNoise({"grip": 0.1}), "'grip' is unknown"),
-        (sh.InputNoise(covariance=np.eye(5) + 0.1), "correlated"),
+        (sh.InputNoise(covariance=np.eye(4) + 0.1), "has 4 rows"),
     ],
 )
 def test_noise_that_cannot_be_is_refused(noise, message):
