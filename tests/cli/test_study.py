@@ -498,7 +498,10 @@ def test_choices_need_no_quotes(capsys):
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("create rig --parameters x=0:1 --risk cvar=0.1 --noise none", "--risk cvar=0.1 is of executions under input noise"),
+        (
+            "create rig --parameters x=0:1 --risk cvar=0.1 --noise none",
+            "--risk cvar=0.1 is of executions under input noise",
+        ),
         ("create rig --parameters x=0:1,y=0:1:log", "or NAME=this/that"),
         ("work rig --trials 0", "--trials is 0; give 1 or more"),
     ],
