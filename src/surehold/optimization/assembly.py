@@ -178,7 +178,9 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     rng = np.random.default_rng([seed, 0])
     rest = initial_design(s.design, max(n_initial - len(first), 1), box.dimension, rng)
     if s.guess:
-        rest = drawn_to(_guess(s, box), rest)
+        snap = np.asarray if lattice is None else lattice.snap
+        within = {} if region is None else {"allowed": region.contains, "pool": region.points}
+        rest = drawn_to(_guess(s, box), rest, before=first, snap=snap, **within)
     if requirements is not None:
         rest = requirements.initial(rest, first, rng)
     if lattice is not None and thesis is None and not strategy.ranking.noisy:

@@ -81,8 +81,8 @@ class Optimizer(Record):
         design, whose rest follows.
     guess
         {name: value} of variables of which it is known where the optimum may be: two of three trials of the initial
-        design keep these values, the third is anywhere. Where all variables are named, one trial is made there, and
-        the others of the two thirds around it. After the initial design it counts no more.
+        design keep these values, the third is anywhere. Of those that would be the same trial, as where all variables
+        are named, the first is made there, and the others around it. After the initial design it counts no more.
     fixed
         {name: value} of variables that keep this value in every trial that is asked for and in every answer. Trials
         told at other values teach the model, but are no answer.

@@ -52,3 +52,31 @@ def test_around_a_guess_of_all_coordinates_no_two_points_are_the_same():
     assert len(np.unique(moved, axis=0)) == 12
     share = np.linalg.norm(moved - guess, axis=1) / np.linalg.norm(points - guess, axis=1)
     np.testing.assert_allclose(share[np.arange(12) % 3 != 2], np.array([0, 1, 3, 4, 6, 7, 9, 10]) / 24)
+
+
+def test_of_points_that_would_be_the_same_trial_with_a_guess_one_is_made_there():
+    """A guess of all variables that are not fixed, or whose others are few choices, was tried again and again."""
+    points = design("latin_hypercube", 12, 2, np.random.default_rng(0))
+    moved = drawn_to(np.array([0.3, np.nan]), points, snap=lambda u: np.array([u[0], np.round(u[1])]))
+    kept = np.arange(12) % 3 != 2
+    tried = np.column_stack([moved[:, 0], np.round(moved[:, 1])])
+    assert len(np.unique(tried, axis=0)) == 12
+    assert sorted(tried[kept & (moved[:, 0] == 0.3), 1]) == [0.0, 1.0]
+    assert np.all(np.abs(moved[kept, 0] - 0.3) <= 0.5 * np.abs(points[kept, 0] - 0.3))
+    again = drawn_to(np.array([0.3, 0.9]), points, before=np.array([[0.3, 0.9]]))
+    assert not np.any(np.all(again == [0.3, 0.9], axis=1)), "it is to be tried already"
+
+
+def test_what_is_not_allowed_with_a_guess_takes_other_coordinates():
+    points, pool = (design("latin_hypercube", n, 2, np.random.default_rng(n)) for n in (12, 200))
+
+    def allowed(U):
+        return U.sum(axis=1) <= 0.6
+
+    moved = drawn_to(np.array([0.4, np.nan]), points, allowed=allowed, pool=pool)
+    kept = np.arange(12) % 3 != 2
+    assert np.all(moved[kept, 0] == 0.4)
+    assert allowed(moved[kept]).all()
+    np.testing.assert_array_equal(moved[~kept], points[~kept])
+    never = drawn_to(np.array([0.7, np.nan]), points, allowed=allowed, pool=pool)
+    assert not np.any(allowed(never) & (never[:, 0] == 0.7))

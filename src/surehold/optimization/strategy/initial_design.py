@@ -1,5 +1,6 @@
 """Initial designs: where to try before a model can say anything (scipy.stats.qmc)."""
 
+from collections.abc import Callable, Iterable
 from typing import Final
 
 import numpy as np
@@ -36,16 +37,38 @@ def design(name: str, n: int, dimension: int, rng: np.random.Generator) -> NDArr
     raise unknown_name("initial design", name, DESIGNS)
 
 
-def drawn_to(guess: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def drawn_to(
+    guess: NDArray[np.float64],
+    points: NDArray[np.float64],
+    *,
+    before: Iterable[NDArray[np.float64]] = (),
+    snap: Callable[[NDArray[np.float64]], NDArray[np.float64]] = np.asarray,
+    allowed: Callable[[NDArray[np.float64]], NDArray[np.bool_]] = lambda U: np.ones(len(U), dtype=bool),
+    pool: Iterable[NDArray[np.float64]] = (),
+) -> NDArray[np.float64]:
     """Return a design (n, d), moved to a guess (d,) of where the optimum is; nan in coordinates of which none is made.
 
     Of `GUESS_TURN` points in turn all but the last keep the guess; that one stays where it is, for the model has to
-    learn what these coordinates do. Where the guess is of all of them, only the first point is there, and the others
-    that are moved lie around it, farther and farther away, at up to half of their distance.
+    learn what these coordinates do. A point that is not `allowed` with the guess takes the other coordinates of one of
+    the `pool` that is. One that would be the same trial as another or as one `before`, as where the guess is of all
+    coordinates, lies near the guess, the later the farther, at up to half of its own distance. `snap` moves points to
+    where they are tried.
     """
-    numbers = np.arange(len(points))
-    moved = numbers % GUESS_TURN != GUESS_TURN - 1
     known = ~np.isnan(guess)
-    share = 0.5 * numbers / len(points) if known.all() else np.zeros(len(points))
-    kept = np.where(known, guess + share[:, None] * (points - guess), points)
-    return np.where(moved[:, None], kept, points)
+    others = [place for place in (np.where(known, guess, point) for point in pool) if allowed(place[None])[0]]
+    result, tried = points.copy(), {_trial(snap(point)) for point in before}
+    for i, point in enumerate(points):
+        if i % GUESS_TURN != GUESS_TURN - 1:
+            share = 0.5 * max(i, 1) / len(points)
+            near = [np.where(known, guess + part * (point - guess), point) for part in (share, share / 4, share / 16)]
+            for place in (np.where(known, guess, point), *others, *near):
+                if _trial(snap(place)) not in tried and allowed(place[None])[0]:
+                    result[i] = place
+                    break
+        tried.add(_trial(snap(result[i])))
+    return result
+
+
+def _trial(point: NDArray[np.float64]) -> bytes:
+    """Return what is equal for points that are the same trial."""
+    return (point + 0.0).tobytes()  # -0.0 is 0.0
