@@ -32,6 +32,34 @@ def test_an_answer_keeps_fixed_values(noise):
     assert optimizer.promise() < 0.02
 
 
+def test_of_many_levels_another_one_is_another_value():
+    """505 of 1,000 counted as 500, as rounded by a rig, and 5 was stated to have been observed there."""
+    optimizer = Optimizer(Box({"a": (0.0, 1.0), "n": (0, 1000, "int")}), fixed={"n": 500}, seed=0)
+    for n, best in ((505, 5.0), (500, 0.0)):
+        for a in A:
+            optimizer.tell({"a": a, "n": n}, best - (a - 0.4) ** 2)
+    found = optimizer.recommend()
+    assert (found.parameters["n"], found.observed) == (500, pytest.approx(-((0.4 - 1 / 3) ** 2)))
+    assert "another value of a fixed variable" in found.refused
+
+
+def test_initial_points_of_a_run_whose_variable_is_fixed_later(tmp_path):
+    optimizer = Optimizer(BOX, initial_points=[[0.1, 0.25], [0.2, 0.5], [0.3, 0.504]], seed=0)
+    for _ in range(4):
+        optimizer.tell(asked := optimizer.ask(), -asked[0])
+    optimizer.save(tmp_path / "run.json")
+    later = Optimizer.load(tmp_path / "run.json", fixed={"b": 0.5})
+    assert (len(later.y), later.ask()[1]) == (4, 0.5)
+    with pytest.raises(InputError, match="never tried"):
+        Optimizer.load(tmp_path / "run.json", fixed={"b": 0.5}, initial_points=[[0.1, 0.25]])
+
+
+def test_a_guess_of_all_that_is_not_fixed_is_tried_once():
+    X = Optimizer(BOX, fixed={"b": 0.5}, guess={"a": 0.3}, n_initial=9, seed=0).ask(9)
+    assert len(np.unique(X[:, 0])) == 9
+    assert X[0].tolist() == [0.3, 0.5]
+
+
 def test_a_value_that_strayed_is_answered_as_it_was_fixed():
     optimizer = Optimizer(BOX, fixed={"b": 0.5}, seed=0)
     for a in A:

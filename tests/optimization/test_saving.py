@@ -69,12 +69,15 @@ def test_parameters_of_a_risk_may_be_of_numpy(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["risk", "linear", "input noise", "object that is not stored"])
-def test_users_choose_the_names_of_outputs_and_fixed_variables(tmp_path, name):
+def test_users_choose_the_names_of_outputs_and_variables(tmp_path, name):
     box = Box({name: (0.0, 1.0), "x": (0.0, 1.0)})
     optimizer = Optimizer(box, fixed={name: 0.25})
     optimizer.tell(optimizer.ask(), 1.0)
     optimizer.save(tmp_path / "fixed.json")
     assert np.array_equal(Optimizer.load(tmp_path / "fixed.json").X, optimizer.X)
+    optimizer = Optimizer(box, guess={name: 0.25})
+    optimizer.save(tmp_path / "guess.json")
+    assert np.array_equal(Optimizer.load(tmp_path / "guess.json").ask(), optimizer.ask())
     optimizer = Optimizer(BOX, constraints={name: (None, 3.0)})
     optimizer.tell(optimizer.ask(), 1.0, constraints={name: 2.0})
     optimizer.save(tmp_path / "outputs.json")

@@ -20,10 +20,15 @@ class Fixed(NamedTuple):
     """which they are, (d,)"""
     values: NDArray[np.float64]
     """(d,); nan of the others"""
+    rounding: NDArray[np.float64]
+    """by how much a coordinate may differ and is still written as the same number, (d,)"""
+    smooth: NDArray[np.bool_]
+    """whether a coordinate can be tried everywhere, (d,)"""
 
-    def keeps(self, U: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which points U (q, d) have these values, but for what a rig rounds: (q,)."""
-        return np.all((np.abs(U - self.values) <= ROUNDED) | ~self.held, axis=1)
+    def keeps(self, U: NDArray[np.float64], exactly: bool = False) -> NDArray[np.bool_]:
+        """Tell which points U (q, d) have these values: but for what a rig rounds, which is no level, or exactly."""
+        slack = self.rounding if exactly else np.where(self.smooth, ROUNDED, self.rounding)
+        return np.all((np.abs(U - self.values) <= slack) | ~self.held, axis=1)
 
 
 def fixed_of(box: Box, fixed: Mapping[str, Any] | None) -> Fixed | None:
@@ -37,7 +42,7 @@ def fixed_of(box: Box, fixed: Mapping[str, Any] | None) -> Fixed | None:
     held = ~np.isnan(values)
     if held.all():
         raise InputError("every variable is fixed; there is nothing to optimize.")
-    return Fixed(held, values)
+    return Fixed(held, values, box.rounding / box.widths, box.smooth)
 
 
 def places_of(box: Box, argument: str, values: Mapping[str, Any]) -> NDArray[np.float64]:

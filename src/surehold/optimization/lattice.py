@@ -77,7 +77,7 @@ def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | No
     constant = fixed_of(box, fixed)
     if constant is None:
         return lattice
-    held, values = constant
+    held, values = constant.held, constant.values
 
     def snap(U: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.where(held, values, U if lattice is None else lattice.snap(U))

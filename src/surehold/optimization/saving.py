@@ -13,7 +13,7 @@ from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.box import Box
 from surehold.optimization.constraints.linear import Linear
-from surehold.optimization.known_coordinates import fixed_of
+from surehold.optimization.known_coordinates import Fixed, fixed_of
 from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.trials import Trials
@@ -22,6 +22,7 @@ __all__ = ["read", "write"]
 
 _FORMAT: Final = "surehold optimizer"
 _VERSION: Final = 1
+_NAMED_BY_USERS: Final = ("constraints", "fixed", "guess")  # settings {name: value}: no name is a word of the file
 _OBJECT: Final = "object that is not stored"
 
 
@@ -78,7 +79,8 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
     """Return the box, the settings, those `given` in place of stored ones, and the trials that a file holds.
 
     Where other `constraints` are given the outputs stay those of their names: one that is new was not measured, one
-    that is left out is dropped. Where the other `direction` is given values stay as they were told.
+    that is left out is dropped. Where the other `direction` is given values stay as they were told. Where other `fixed`
+    values are given initial points at others are dropped.
 
     Raises
     ------
@@ -102,6 +104,9 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
         given_conditions = None if conditions is None else {tuple(conditions["names"]): conditions["samples"]}
         box = Box(data["box"], uncontrolled=given_conditions)
         settings = {name: _restored(name, value) for name, value in {**data["settings"], **given}.items()}
+        constant = fixed_of(box, settings.get("fixed"))
+        if "fixed" in given and constant is not None and "initial_points" not in given:
+            settings["initial_points"] = _still_tried(box, constant, settings.get("initial_points"))
         told, pending = data["trials"], data["pending"]
         limits, stored = limits_of(settings.get("constraints")), list(data["settings"].get("constraints") or ())
         columns = [stored.index(limit.name) if limit.name in stored else len(stored) for limit in limits]
@@ -111,7 +116,7 @@ def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, d
         # What is stored is in the sign in which it is maximized.
         same = settings.get("direction", "maximize") == data["settings"].get("direction", "maximize")
         sign = 1.0 if same else -1.0
-        trials = Trials(box, limits, settings.get("outcome", "value") != "value", fixed_of(box, settings.get("fixed")))
+        trials = Trials(box, limits, settings.get("outcome", "value") != "value", constant)
         trials.restore_cube(
             [trial["commanded"] for trial in told],
             [np.nan if trial["value"] is None else sign * trial["value"] for trial in told],
@@ -142,6 +147,12 @@ def _conditions(box: Box) -> dict[str, Any]:
     return {"names": names, "samples": held.values.tolist()}
 
 
+def _still_tried(box: Box, fixed: Fixed, points: Any) -> Any:
+    """Return the initial points at the values of variables that were fixed later; those at others are not asked for."""
+    kept = [] if points is None else [point for point in points if fixed.keeps(box.to_unit([point]), exactly=True)[0]]
+    return kept or None
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, InputNoise) and not value.varies:
         return {"input noise": value.to_json()}
@@ -159,7 +170,7 @@ def _plain(value: Any) -> Any:
 
 
 def _restored(name: str, value: Any) -> Any:
-    if name in ("constraints", "fixed") or not isinstance(value, (dict, list)):  # of which users choose the names
+    if name in _NAMED_BY_USERS or not isinstance(value, (dict, list)):
         return value
     if isinstance(value, list):
         return [_restored(name, entry) for entry in value] if name == "allowed" else value
