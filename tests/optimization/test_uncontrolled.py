@@ -205,3 +205,10 @@ def test_a_condition_may_lie_beyond_its_range():
     best = optimizer.recommend()
     assert best.x[0] == pytest.approx(0.4)
     assert not best.refused, "the best trial was recommended: its condition is not the answer's to choose"
+
+
+@pytest.mark.parametrize("conditions", ["commanded", "measured"])
+def test_a_guess_of_all_that_is_set_is_tried_once(conditions):
+    X = Optimizer(LOADED, guess={"x": 0.3}, conditions=conditions, n_initial=9, seed=0).ask(9)
+    assert X[0, 0] == 0.3
+    assert len(np.unique(X[:, 0])) == 9

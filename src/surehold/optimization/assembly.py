@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -178,9 +179,8 @@ def assembled(box: Box, settings: Mapping[str, Any]) -> Parts:
     rng = np.random.default_rng([seed, 0])
     rest = initial_design(s.design, max(n_initial - len(first), 1), box.dimension, rng)
     if s.guess:
-        snap = np.asarray if lattice is None else lattice.snap
         within = {} if region is None else {"allowed": region.contains, "pool": region.points}
-        rest = drawn_to(_guess(s, box), rest, before=first, snap=snap, **within)
+        rest = drawn_to(_guess(s, box), rest, before=first, snap=partial(_commanded, box, lattice), **within)
     if requirements is not None:
         rest = requirements.initial(rest, first, rng)
     if lattice is not None and thesis is None and not strategy.ranking.noisy:
@@ -227,6 +227,12 @@ def _check(s: SimpleNamespace, d: int) -> None:
         raise InputError(f"k is {s.k!r}; with {d} coordinates it must be a finite number above {-d}.")
     if s.kappa < 0.0:
         raise InputError(f"kappa is {s.kappa!r}; give standard deviations to be added, 0 or more.")
+
+
+def _commanded(box: Box, lattice: Lattice | None, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what is equal, of points u (d,) of the cube, where the same is commanded."""
+    u = u if lattice is None else lattice.snap(u)
+    return u if box.uncontrolled is None else box.uncontrolled.at_mean(u)
 
 
 def _guess(s: SimpleNamespace, box: Box) -> NDArray[np.float64]:
