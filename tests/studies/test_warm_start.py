@@ -1,6 +1,7 @@
 """Former trials: each is taken once, failed ones are named, and a header that does not fit says what may be meant."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -132,9 +133,13 @@ def test_a_file_in_another_encoding_is_told_which(here):
         trials_of_csv("rig.csv", NAMES)
 
 
-def test_a_study_is_not_imported_into_itself(here, capsys):
-    study = created("warm")
+@pytest.mark.parametrize("url", ["warm.log", "sqlite:///warm.db"])
+@pytest.mark.parametrize("other", [lambda url: url, lambda url: url.replace("warm.", f"{Path.cwd()}/warm.")])
+def test_a_study_is_not_imported_into_itself(here, capsys, url, other):
+    study = RobotStudy.create("warm", StudySettings(SPACE), url)
     study.tell(study.ask().id, 0.5)
-    assert run(["study", "import", "warm", "--study", "warm", "--from", "warm.log", "--storage", "warm.log"]) == 2
+    line = ["study", "import", "warm", "--study", "warm", "--from", other(url), "--storage", url]
+    assert run(line) == 2
     assert "has its own trials already" in capsys.readouterr().err
     assert len(study.trials()) == 1
+    study.close()

@@ -60,13 +60,18 @@ class Storage:
         self.backend: Final = backend
         self.url: Final = url
         self.shown: Final = _without_password(url)
-        self._engine = engine
+        self._engine, self._file = engine, beside
         self._database = beside if engine is not None else None
         self._identity = _identity(self._database)
         self._asking, self._telling = (
             StudyLock(key, None if beside is None else beside.with_name(beside.name + ending), engine)
             for key, ending in ((f"surehold:{name}", ".asking"), (f"surehold answers:{name}", _TELLING))
         )
+
+    def is_that_of(self, other: "Storage") -> bool:
+        """Tell whether another one is the same, however either file was named."""
+        file = _identity(self._file)
+        return self.url == other.url or (file is not None and file == _identity(other._file))
 
     @contextmanager
     def handing_out(self) -> Iterator[None]:

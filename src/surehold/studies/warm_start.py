@@ -261,7 +261,7 @@ def former_study(name: str, storage: str, into: RobotStudy) -> Study:
         If it is not there, or is the one that its trials are for: each would count twice.
     """
     opened = open_storage(storage, name, create=False)
-    if (name, opened.url) == (into.name, into.storage.url):
+    if name == into.name and opened.is_that_of(into.storage):
         raise InputError(f"study '{name}' in {opened.shown} has its own trials already; name another one.")
     with opened.failures():
         names = optuna.get_all_study_names(opened.backend)
