@@ -89,6 +89,16 @@ def test_executions_that_leave_the_ranges_are_named(study, capsys):
     assert " along x leave it. Nothing was" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("option", ["--guess fingers=2,speed=0.5", "--first fingers=2,speed=0.5,x=0.25"])
+def test_a_choice_may_be_a_number(study, option):
+    """Of 2 came 2.0, which is none of the choices."""
+    study(f"create hand --parameters fingers=2/3/5,speed=0.5/inf,x=0:1 --noise none {option}")
+    asked = study("ask hand")["parameters"]
+    assert (asked["fingers"], asked["speed"]) == ("2", "0.5")
+    study("create fast --parameters speed=0.5/inf,x=0:1 --noise none --guess speed=inf")
+    assert study("ask fast")["parameters"]["speed"] == "inf"
+
+
 def test_a_robot_stops_at_the_border(study):
     """What it says is what an optimizer says that is told so."""
     assert study("create edge --parameters x=0:1 --noise x=0.1 --border clip")["optimizer"]["border"] == "clip"

@@ -1,5 +1,6 @@
 """Options that several commands share, and how their text is read."""
 
+import math
 from typing import Annotated, Any
 
 import typer
@@ -250,13 +251,18 @@ def _values(text: str, option: str) -> dict[str, float | str]:
     """Return {name: value} of an option NAME=VALUE,...; what is no number is a choice."""
     from surehold.studies.parameter_text import parse_assignments
 
-    found: dict[str, float | str] = {}
-    for name, value in parse_assignments(text, option).items():
-        try:
-            found[name] = float(value)
-        except ValueError:
-            found[name] = value
-    return found
+    return {name: _number_or_choice(value) for name, value in parse_assignments(text, option).items()}
+
+
+def _number_or_choice(text: str) -> float | str:
+    """Return the number that a text is, and 2 as 2: a choice is found by its text, and 2.0 is another one."""
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    if not math.isfinite(number):
+        return text
+    return int(number) if str(int(number)) == text else number
 
 
 def numbers_given(text: str) -> dict[str, float | None] | None:
