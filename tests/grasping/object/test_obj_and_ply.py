@@ -102,6 +102,16 @@ def test_words_beside_vertices_and_faces_are_passed_over():
     assert faces.tolist() == [[0, 1, 2]]
 
 
+@pytest.mark.parametrize("line", ["# C:\\parts\\", "mtllib C:\\parts\\", "g left\\"])
+def test_a_path_that_ends_in_a_backslash_swallows_no_line(line):
+    vertices, faces = iron()
+    plain, (first, *rest) = obj_text(vertices, faces), obj_text(vertices, faces).split("\n")
+    before_faces = plain.replace("f ", f"{line}\nf ", 1)
+    for text in ("\n".join([line, first, *rest]), before_faces):
+        for found, expected in zip(read_obj(text.encode()), read_obj(plain.encode()), strict=True):
+            assert np.array_equal(found, expected)
+
+
 @pytest.mark.parametrize("kind", ["obj", "ply", "ply of text"])
 def test_a_ball_is_read_as_trimesh_reads_it(kind):
     ball = trimesh.creation.icosphere(2, 30.0)
@@ -116,6 +126,44 @@ def test_a_ball_is_read_as_trimesh_reads_it(kind):
         assert np.array_equal(found.corners.reshape(-1, 3), ball.faces)
         assert np.all(found.counts == 3)
     assert vertices == pytest.approx(ball.vertices, abs=1e-5)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary"])
+def test_labels_of_64_bits_that_trimesh_writes_are_passed_over(encoding):
+    ball = trimesh.creation.icosphere(1, 30.0)
+    ball.vertex_attributes["label"] = np.arange(len(ball.vertices))
+    ball.face_attributes["part"] = np.arange(len(ball.faces))
+    content = trimesh.exchange.ply.export_ply(ball, encoding=encoding)
+    assert content.count(b"property int64") == 2
+    found = read_ply(content)
+    assert found.vertices == pytest.approx(ball.vertices, abs=1e-5)
+    assert np.array_equal(found.corners.reshape(-1, 3), ball.faces)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_lists_beside_the_corners_may_hold_any_number(form, mixed):
+    """MeshLab writes coordinates of a texture at the corners of each face, NaN where there are none."""
+    faces = [[0, 1, 2], [0, 2, 3], *([[0, 1, 2, 3]] if mixed else [])]
+    places = [[np.nan, 0.5] * len(face) for face in faces]
+    head = (
+        f"ply\nformat {form} 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
+        "property list uchar float texcoord\nend_header\n"
+    ).encode()
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype="<f4")
+    if form == "ascii":
+        rows = [" ".join(map(str, [len(f), *f, len(p), *p])) for f, p in zip(faces, places, strict=True)]
+        body = "\n".join([*(" ".join(map(str, vertex)) for vertex in square.tolist()), *rows]).encode()
+    else:
+        packed = [
+            struct.pack(f"<B{len(f)}iB{len(p)}f", len(f), *f, len(p), *p) for f, p in zip(faces, places, strict=True)
+        ]
+        body = square.tobytes() + b"".join(packed)
+    found = read_ply(head + body)
+    assert found.corners.tolist() == [corner for face in faces for corner in face]
+    assert found.counts.tolist() == [len(face) for face in faces]
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,8 @@ __all__ = ["read_obj"]
 
 _VERTEX: Final = re.compile(rb"(?m)^[ \t]*v[ \t]+([^#\n]*)")
 _FACE: Final = re.compile(rb"(?m)^[ \t]*f[ \t]+([^#\n]*)")
+# A path or a comment that ends in a backslash does not go on: the vertex behind it would be lost.
+_GOES_ON: Final = re.compile(rb"(?m)^[ \t]*[vf][ \t][^#\\\n]*(?:\\[ \t]*\n[^#\\\n]*)+")
 
 
 def read_obj(content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -32,7 +34,8 @@ def read_obj(content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         If a line cannot be read; the message names it.
     """
     text = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    text = re.sub(rb"\\[ \t]*\n", b" ", text) if b"\\" in text else text  # a line that goes on counts as one
+    if b"\\" in text:  # a line that goes on counts as one
+        text = _GOES_ON.sub(lambda line: re.sub(rb"\\[ \t]*\n", b" ", line[0]), text)
     vertices = _vertices(text)
     faces = [re.sub(rb"/[^\s]*", b"", face) for face in _FACE.findall(text)]
     counts = np.array([len(face.split()) for face in faces], dtype=np.int64)

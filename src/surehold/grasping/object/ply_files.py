@@ -8,7 +8,8 @@
     property list uchar int vertex_indices               or vertex_index; faces have any number of corners, of any size
     end_header
 
-Elements and properties of other names are passed over, in whatever order they stand.
+Elements and properties of other names are passed over, in whatever order they stand. Whole numbers of 8 bytes, which
+trimesh writes and the format does not have, are read as well.
 """
 
 import struct
@@ -25,10 +26,13 @@ __all__ = ["PlyFile", "read_ply"]
 
 Array = NDArray[np.float64]
 
-_NAMES: Final = "char uchar short ushort int uint float double int8 uint8 int16 uint16 int32 uint32 float32 float64"
-_KINDS: Final = "i1 u1 i2 u2 i4 u4 f4 f8 i1 u1 i2 u2 i4 u4 f4 f8"
+_NAMES: Final = (
+    "char uchar short ushort int uint float double int8 uint8 int16 uint16 int32 uint32 float32 float64 int64 uint64"
+)
+_KINDS: Final = "i1 u1 i2 u2 i4 u4 f4 f8 i1 u1 i2 u2 i4 u4 f4 f8 i8 u8"
 _TYPES: Final[dict[str, str]] = dict(zip(_NAMES.split(), _KINDS.split(), strict=True))
-_LETTERS: Final = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
+_WHOLE: Final = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q"}
+_LETTERS: Final = {**_WHOLE, "f4": "f", "f8": "d"}
 _ORDERS: Final = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNERS: Final = ("vertex_indices", "vertex_index")
 
@@ -77,7 +81,7 @@ def read_ply(content: bytes) -> PlyFile:
     normals = np.column_stack([vertex[name] for name in normal]) if set(normal) <= set(vertex) else None
     none = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     corners, counts = next((face[name] for name in _CORNERS if name in face), none)
-    return PlyFile(np.column_stack([vertex[name] for name in "xyz"]), normals, corners, counts)
+    return PlyFile(np.column_stack([vertex[name] for name in "xyz"]), normals, corners.astype(np.int64), counts)
 
 
 def _header(content: bytes) -> tuple[str, list[_Element], int]:
@@ -130,9 +134,7 @@ def _text(lines: list[bytes], element: _Element) -> Mapping[str, Any]:
         except (ValueError, IndexError):
             raise _unreadable(element, k, lines[k]) from None
     return {
-        name: (np.array(values[name], dtype=np.int64), np.array(lengths[name], dtype=np.int64))
-        if length
-        else np.array(values[name])
+        name: (np.array(values[name]), np.array(lengths[name], dtype=np.int64)) if length else np.array(values[name])
         for name, _, length in element.properties
     }
 
@@ -176,7 +178,7 @@ def _binary(content: bytes, start: int, element: _Element, order: str) -> tuple[
             columns: dict[str, Any] = {name: table[name] for name, _, length in element.properties if not length}
             columns = {name: column.astype(np.float64) for name, column in columns.items()}
             for name, _ in lists:
-                columns[name] = table[name].astype(np.int64).ravel(), table[f"{name} length"].astype(np.int64)
+                columns[name] = table[name].ravel(), table[f"{name} length"].astype(np.int64)
             return columns, start + element.count * record.itemsize
     except (ValueError, struct.error):
         pass  # faces of several sizes may take less room than the first one does; what is short is found below
@@ -197,7 +199,7 @@ def _by_row(content: bytes, start: int, element: _Element, order: str) -> tuple[
     except struct.error:
         raise InputError(f"it ends before its {element.count:,} rows of {element.name}; copy it again.") from None
     return {
-        name: (np.array(values[name]).astype(np.int64), np.array(lengths[name], dtype=np.int64))
+        name: (np.array(values[name]), np.array(lengths[name], dtype=np.int64))
         if length
         else np.array(values[name], dtype=np.float64)
         for name, _, length in element.properties
