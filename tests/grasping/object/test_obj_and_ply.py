@@ -140,6 +140,14 @@ def test_labels_of_64_bits_that_trimesh_writes_are_passed_over(encoding):
     assert np.array_equal(found.corners.reshape(-1, 3), ball.faces)
 
 
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+def test_an_element_without_properties_has_no_rows(form):
+    """Of text it took the faces; of a binary file it was counted to the end."""
+    content = ply_content(*iron(), form)
+    more = content.replace(b"element face", b"element nothing 1000000000000\nelement face")
+    assert np.array_equal(read_ply(more).corners, read_ply(content).corners)
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
 @pytest.mark.parametrize("mixed", [False, True])

@@ -99,6 +99,7 @@ def test_unknown_object_and_bad_numbers_are_explained():
         ({"faces": np.array([[0, 1, 10**6]])}, "faces of 'mug'"),
         ({"center_of_mass": np.array([np.nan, 0.0, 0.0])}, "center_of_mass of 'mug' is"),
         ({"axes": 2.0 * np.eye(3)}, "axes of 'mug' are no rotation"),
+        ({"axes": np.diag([1.0, 1.0, -1.0])}, "axes of 'mug' are no rotation .* right-handed"),
     ],
 )
 def test_arrays_that_are_no_object_are_explained(changed, words):

@@ -51,8 +51,11 @@ class GraspObject:
             raise InputError(
                 f"center_of_mass of '{self.name}' is {self.center_of_mass!r}; give three numbers in meters."
             )
-        if np.shape(self.axes) != (3, 3) or not np.allclose(self.axes.T @ self.axes, np.eye(3), atol=1e-6):
-            raise InputError(f"axes of '{self.name}' are no rotation (3, 3); give the axes of its box as unit columns.")
+        axes = np.asarray(self.axes)
+        if axes.shape != (3, 3) or not np.allclose(axes.T @ axes, np.eye(3), atol=1e-6) or np.linalg.det(axes) < 0.0:
+            raise InputError(
+                f"axes of '{self.name}' are no rotation (3, 3); give the axes of its box as unit columns, right-handed."
+            )
 
     @property
     def box_center(self) -> NDArray[np.float64]:

@@ -107,7 +107,7 @@ def _header(content: bytes) -> tuple[str, list[_Element], int]:
                 elements[-1].properties.append((words[2], _TYPES[words[1]], ""))
         except (KeyError, IndexError, ValueError):
             raise InputError(f"line {number} of its header is {line[:60]!r}, which PLY does not know.") from None
-    return order, elements, start
+    return order, [element for element in elements if element.properties], start  # others have no rows
 
 
 def _text(lines: list[bytes], element: _Element) -> Mapping[str, Any]:
