@@ -131,3 +131,8 @@ def test_limits_in_degrees_are_refused(tmp_path):
         InputError, match=r"'a1' of .* turns from 0 to 85.9 rad, several turns; are its limits in degrees"
     ):
         propose_hand(path)
+
+
+def test_limits_of_two_turns_as_programs_round_them_are_no_degrees(tmp_path):
+    turns = urdf('<box size=".02 .016 .06"/>').replace('"0" upper="1.5"', '"-6.28318530718" upper="6.28318530718"')
+    assert propose_hand(written(tmp_path, "meshes/box.stl", turns))
