@@ -182,3 +182,13 @@ def test_what_lies_within_two_deviations_is_said_of_normal_noise_only(gm_report,
     drawn = np.random.default_rng(0).standard_normal((100_000, 2))
     within = {2: np.hypot(*drawn.T) < 2.0, 1: abs(drawn[:, 0]) < 2.0}[np.count_nonzero(deviations)]
     assert f"{100.0 * within.mean():.0f} %" in said or not normal
+
+
+def test_a_ring_is_no_line_because_of_its_units(gm_report):
+    scale, variables = np.array([1e-12, 1e9]), gm_report.variables
+    others = [replace(v, lower=v.lower * s, upper=v.upper * s) for v, s in zip(variables, scale, strict=True)]
+    both = [replace(c, x=c.x * scale, noise=np.diag((0.1 * scale) ** 2)) for c in gm_report.candidates]
+    axes = tuple(axis * s for axis, s in zip(gm_report.surfaces[0].axes, scale, strict=True))
+    views = (replace(gm_report.surfaces[0], axes=axes),)
+    changed = {"variables": tuple(others), "candidates": tuple(both), "X": gm_report.X * scale, "surfaces": views}
+    assert "ring: two standard deviations" in render(replace(gm_report, normal_noise=True, **changed))

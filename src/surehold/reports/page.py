@@ -236,7 +236,9 @@ def _ring(report: RunReport, view: Surface) -> str:
     """Return what is drawn around the candidates of a map; how much lies within is known of normal noise only."""
     if report.noise is None:
         return ""
-    held = np.linalg.matrix_rank(report.noise[np.ix_(view.variables, view.variables)], hermitian=True)
+    widths = np.array([report.variables[i].upper - report.variables[i].lower for i in view.variables])
+    unit = report.noise[np.ix_(view.variables, view.variables)] / np.outer(widths, widths)  # a farad, a hertz
+    held = np.linalg.matrix_rank(unit, hermitian=True)
     what = {0: "", 1: "line: two standard deviations of the input noise to each side"}
     share = {1: 95, 2: 86}  # erf(sqrt(2)), and 1 - exp(-2)
     text = what.get(int(held), "ring: two standard deviations of the input noise")
