@@ -49,6 +49,17 @@ def test_what_is_felt_lies_on_the_true_surface_and_what_is_swept_is_free(explore
     assert len(run.X) == len(run.y) == 4
 
 
+@pytest.mark.parametrize("tried", [0, 1])
+def test_two_of_three_new_places_keep_the_default_pose(tried):
+    problem = GraspProblem(BOTTLE, variables=("dx", "dy", "dz", "rz", "s1"))
+    run = Exploration(problem, belief_of_box(BOTTLE, cell=0.006), NOISE, shapes=2)
+    run.restore(problem.box.from_unit(np.full((tried, 5), 0.3)), np.full(tried, 0.1), [])
+    new = run._candidates()[16 * tried :]  # behind the steps around the best trial
+    kept = np.isclose(new[:, 2:], list(problem.guess.values()), rtol=0.0, atol=1e-9).all(axis=1)
+    assert kept.tolist() == [k % 3 != 2 for k in range(48 - 16 * tried)]
+    assert len(np.unique(new[:, :2], axis=0)) == len(new), "dx and dy are anywhere"
+
+
 def test_the_surface_moves_to_what_was_felt(explored):
     run, touches = explored
     before = belief_of_box(BOTTLE).surface
