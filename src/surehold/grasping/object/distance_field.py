@@ -178,7 +178,8 @@ def _load(path: Path, shape: tuple[int, ...]) -> NDArray[np.float32] | None:
         nodes = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError):
         return None  # missing or damaged: it is computed anew
-    return nodes if nodes.shape == shape and nodes.dtype == np.float32 else None
+    sound = nodes.shape == shape and nodes.dtype == np.float32 and np.isfinite(nodes).all()
+    return nodes if sound else None
 
 
 def _store(path: Path, nodes: NDArray[np.float32]) -> None:
