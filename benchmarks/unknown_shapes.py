@@ -13,9 +13,9 @@ draws    what a grasp planned on the mean surface is worth: in truth, there, and
          draws and of the mean surface are off [degrees, medians]; and the logarithm of the joint density of 80 hidden
          places and their normals, for each place
 touched  from a box, after 30 touches at random: the share of true surface points in the believed 95 % interval, of
-         those within 10 mm of a contact and turned as it is, to 60 degrees (`touched`), of those as near that are turned
-         farther, as the inner wall of a vessel is (`behind`), and of the others (`far`), and the share of the believed
-         surface
+         those within 10 mm of a contact and turned as it is, to 60 degrees (`touched`), of those as near that are
+         turned farther, as the inner wall of a vessel is (`behind`), and of the others (`far`), and the share of the
+         believed surface
 explore  from a box: the true worth of the answer after 10, 20, 40, 50 and 80 trials
 search   the same of optimization that learns no shape, and after 100 trials
 guess    the same, of which two of three initial trials keep the default pose (`GraspProblem.guess`)
