@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from scipy.special import ndtr
@@ -303,3 +305,16 @@ def test_of_noisy_outputs_feasible_leaves_the_noise_out_that_a_measured_value_ha
     measured = ndtr((1.2 - 2.0 * best.x[0]) / 0.2)
     assert best.outputs["force"].probability_below(1.2) == pytest.approx(measured, abs=0.15)
     assert best.feasible > best.outputs["force"].probability_below(1.2) + 0.1
+
+
+def test_a_place_that_fails_too_often_says_how_often_and_how_often_is_asked_for():
+    """A slope that ends where trials fail: at its top half of the executions do."""
+    X = np.linspace(0.0, 1.0, 21)[:, None]
+    y = np.where(X[:, 0] <= 0.6, X[:, 0], np.nan)
+    optimizer = Optimizer(Box({"x": (0.0, 1.0)}), input_noise=InputNoise({"x": 0.05}), seed=0)
+    optimizer.restore(X, y)
+    best = optimizer.recommend()
+    assert best.x[0] < 0.55
+    told = re.search(r"only ([\d.]+) % of its executions are expected to succeed, and 95 % are asked for", best.refused)
+    assert told, best.refused
+    assert 30.0 < float(told[1]) < 80.0

@@ -248,7 +248,11 @@ class Requirements:
                 np.exp(Succeeds(model, self._ranking.accurate).log_probability(trials.places[k : k + 1])[0][0])
             )
             if share < self.level:
-                return f"{start}only {share:.0%} of its executions are expected to succeed."
+                shown = np.floor(1e3 * share) / 10.0  # rounded up it could be what is asked for
+                return (
+                    f"{start}only {shown:g} % of its executions are expected to succeed, and {100.0 * self.level:g} % "
+                    "are asked for."
+                )
         share = float(self.probability(trials, trials.places[k : k + 1])[0])
         if share >= self.level:
             few = f"too few to be sure of the {100.0 * self.level:.4g}% asked for"
