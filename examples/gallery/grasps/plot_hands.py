@@ -11,7 +11,7 @@ import io
 import matplotlib.pyplot as plt
 
 import surehold as sh
-from surehold.reports.gather import drawn_scene
+from surehold.reports.scene import drawn_scene
 from surehold.reports.still import still_picture
 
 figure, panels = plt.subplots(1, 3, figsize=(9, 3))

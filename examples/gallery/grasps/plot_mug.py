@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import surehold as sh
-from surehold.reports.gather import drawn_scene
+from surehold.reports.scene import drawn_scene
 from surehold.reports.still import still_picture
 
 problem = sh.problems.GraspProblem("mug", variables=("dx", "dy"))

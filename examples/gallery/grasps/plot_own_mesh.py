@@ -14,7 +14,7 @@ import trimesh
 
 import surehold as sh
 from surehold.grasping.object.mesh_files import load_mesh
-from surehold.reports.gather import drawn_scene
+from surehold.reports.scene import drawn_scene
 from surehold.reports.still import still_picture
 
 solid = trimesh.boolean.difference(

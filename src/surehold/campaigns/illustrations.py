@@ -17,9 +17,9 @@ from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.surrogates.protocol import Posterior, mixture
 from surehold.problems.grasp.problem import GraspProblem
 from surehold.problems.synthetic import synthetic_function
-from surehold.reports import gather
 from surehold.reports.campaign_report import Band, Line, Panel, Picture, Points
 from surehold.reports.run_report import Scene
+from surehold.reports.scene import drawn_scene
 
 __all__ = ["grasp_scenes", "illustrations"]
 
@@ -172,13 +172,13 @@ def grasp_scenes(answers: dict[str, tuple[list[float], list[float]]] | None = No
         center = problem.box.from_unit(np.full(problem.box.dimension, 0.5))
         figure = "4.2, 4.3" if obj == "glass" else "4.2"
         opened = grasp_scene(problem.simulator, problem.grasp(center), opened=True)
-        scenes[f"Figure {figure}: {obj}"] = gather.drawn_scene(opened)
+        scenes[f"Figure {figure}: {obj}"] = drawn_scene(opened)
     problem = _grasp_of(problems["bottle"])
     for label, (u, shaken) in (answers or {}).items():
         for word, place in (("", u), (", worst re-query", shaken)):
             x = problem.box.from_unit(np.array(place))
             name = f"Figure 4.16: {label}{word}, {float(np.asarray(problem(x))):.3f}"
-            scenes[name] = gather.drawn_scene(grasp_scene(problem.simulator, problem.grasp(x)))
+            scenes[name] = drawn_scene(grasp_scene(problem.simulator, problem.grasp(x)))
     return scenes
 
 

@@ -246,7 +246,7 @@ def advice_for(problem: Any) -> str:
 def drawn(problem: Any, outcome: Any) -> Any:
     """Return the scene of a grasp; an object of unknown shape is colored by how uncertain its surface is."""
     from surehold.grasping.pictures.scene import grasp_scene
-    from surehold.reports.gather import drawn_scene
+    from surehold.reports.scene import drawn_scene
     from surehold.reports.uncertain_shape import LEGEND, shape_meshes
 
     scene = drawn_scene(grasp_scene(problem.simulator, outcome))

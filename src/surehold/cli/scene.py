@@ -44,8 +44,8 @@ def scene(
     from surehold.problems.grasp.default_poses import default_facet
     from surehold.problems.grasp.description import described_grasp, described_hand
     from surehold.problems.grasp.options import checked_words
-    from surehold.reports import gather
     from surehold.reports.run_report import Candidate
+    from surehold.reports.scene import drawn_scene
     from surehold.reports.scenes_page import render_scenes
     from surehold.reports.still import still_picture
     from surehold.store.atomic import write_file
@@ -68,7 +68,7 @@ def scene(
                 with announced(console), shown_progress(f"{body.name}, {mode}", console) as progress:
                     problem = described_grasp({**described, "facet": mode}, body, progress)
                 x, outcome, free = _best(problem)
-                drawn = gather.drawn_scene(grasp_scene(problem.simulator, outcome))
+                drawn = drawn_scene(grasp_scene(problem.simulator, outcome))
                 label = f"{body.name}, {mode}"
                 views.append(Candidate(label, x, outcome.quality, scene=drawn))
                 shares = f"{100.0 * free:.0f} % of {_ALONG * _ACROSS}"

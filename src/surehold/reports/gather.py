@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,25 +16,18 @@ from surehold.optimization.variables import Number
 from surehold.problems.perturbation import RobustScore
 from surehold.reports.run_report import (
     Candidate,
-    ContactSet,
-    ObjectBox,
     RunReport,
     Scene,
-    SceneMesh,
     Surface,
     Variable,
     extreme_of,
 )
 from surehold.reports.surfaces import surfaces_of
 
-if TYPE_CHECKING:
-    from surehold.grasping.pictures.scene import Scene as GraspScene
-
-__all__ = ["answers", "candidate", "drawn_scene", "kept_in_box", "report_of"]
+__all__ = ["answers", "candidate", "kept_in_box", "report_of"]
 
 _SHARES = (0.9, 0.99)  # of executions that succeed, of which the page says how sure they are
 _ADVICE = "Give more trials, a wider box, or count as success what is easier to reach."
-_OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
 
 
 def answers(result: Result) -> dict[str, int]:
@@ -260,21 +253,6 @@ def kept_in_box(scores: Mapping[tuple[str, int], RobustScore | None], result: Re
                 parts.append(f"{count} of {n} of the {label} point")
     kept = "a variable that would have left it kept its commanded value"
     return [f"Re-queries stay in the box: {kept} (in {', '.join(parts)})."] if parts else []
-
-
-def drawn_scene(scene: "GraspScene") -> Scene:
-    """Return a grasp's scene as the page draws it: the object see-through, the links that touch in another color."""
-    thing = scene.object
-    object_mesh = SceneMesh("object", thing.vertices, thing.faces, _OBJECT, see_through=True, poses=thing.poses)
-    touching = set(scene.bodies)
-    hand = [
-        SceneMesh(mesh.name, mesh.vertices, mesh.faces, _TOUCHING if mesh.name in touching else _HAND, poses=mesh.poses)
-        for mesh in scene.hand
-    ]
-    friction = np.full(len(scene.points), float(scene.friction))
-    contacts = ContactSet(scene.points, scene.normals, friction, scene.weights)
-    box = ObjectBox(scene.box_center, 2.0 * scene.box_half_extents, scene.box_axes)
-    return Scene((object_mesh, *hand), contacts, box)
 
 
 def _covariance_at(noise: InputNoise, box: Box, x: NDArray[np.floating]) -> NDArray[np.float64]:

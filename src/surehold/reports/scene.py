@@ -1,18 +1,37 @@
-"""The data of the 3-D scene: every mesh once, as base64 typed arrays, and one view for each grasp."""
+"""The 3-D scene: how a grasp is drawn, and what the page loads: every mesh once, as base64 arrays, one view a grasp."""
 
 import base64
 import hashlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surehold.errors import InputError
-from surehold.reports.run_report import Candidate, Scene, SceneMesh
+from surehold.reports.run_report import Candidate, ContactSet, ObjectBox, Scene, SceneMesh
 
-__all__ = ["scene_data"]
+if TYPE_CHECKING:
+    from surehold.grasping.pictures.scene import Scene as GraspScene
 
+__all__ = ["drawn_scene", "scene_data"]
+
+_OBJECT, _HAND, _TOUCHING = "#5f97d3", "#c3bdb2", "#e0a183"
 _MOST_TRIANGLES = 400_000  # beyond this a page takes long to open on a phone
+
+
+def drawn_scene(scene: "GraspScene") -> Scene:
+    """Return a grasp's scene as the page draws it: the object see-through, the links that touch in another color."""
+    thing = scene.object
+    object_mesh = SceneMesh("object", thing.vertices, thing.faces, _OBJECT, see_through=True, poses=thing.poses)
+    touching = set(scene.bodies)
+    hand = [
+        SceneMesh(mesh.name, mesh.vertices, mesh.faces, _TOUCHING if mesh.name in touching else _HAND, poses=mesh.poses)
+        for mesh in scene.hand
+    ]
+    friction = np.full(len(scene.points), float(scene.friction))
+    contacts = ContactSet(scene.points, scene.normals, friction, scene.weights)
+    box = ObjectBox(scene.box_center, 2.0 * scene.box_half_extents, scene.box_axes)
+    return Scene((object_mesh, *hand), contacts, box)
 
 
 def scene_data(candidates: tuple[Candidate, ...]) -> dict[str, Any] | None:
