@@ -62,8 +62,7 @@ def places_of(box: Box, argument: str, values: Mapping[str, Any]) -> NDArray[np.
             raise InputError(f"{argument} names '{name}', which is uncontrolled: nobody sets it; leave it out.")
         kept[name] = variables[name].checked(value, argument)
     x = box.points({**box.as_dict(box.from_unit(np.full(box.dimension, 0.5))), **kept})
-    places = np.full(box.dimension, np.nan)
+    known = np.zeros(box.dimension, dtype=bool)
     for name in kept:
-        own = box.columns(name)
-        places[own] = np.clip(box.to_unit(x), 0.0, 1.0)[own]
-    return places
+        known[box.columns(name)] = True
+    return np.where(known, np.clip(box.to_unit(x), 0.0, 1.0), np.nan)

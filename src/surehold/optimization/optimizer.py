@@ -317,12 +317,12 @@ class Optimizer(Record):
         history, ranking = self._history, self._ranking
         with computing():
             posterior = self.posterior
-            if not len(history.tried) and self._requirements is None:
-                raise InputError(
-                    "no trial at the values of fixed variables has given a value yet; ask for one, and tell its "
-                    "outcome."
-                )
-            if not len(history.tried) and self._requirements is not None:
+            if not len(history.tried):
+                if self._requirements is None:
+                    raise InputError(
+                        "no trial at the values of fixed variables has given a value yet; ask for one, and tell its "
+                        "outcome."
+                    )
                 where, history = "observed", self._requirements.nearest(self._trials)
             reached = self._reached(OUTCOME_EXPONENT)
             few = self.box.dimension <= FEW_VARIABLES and posterior.diagnostics.observations <= CONTENDERS

@@ -15,7 +15,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
 from surehold.problems.problem import checked_points
 
-__all__ = ["Function", "load_function", "parse_bounds"]
+__all__ = ["Function", "exit_in_words", "load_function", "parse_bounds"]
 
 
 class Function:
@@ -56,7 +56,7 @@ class Function:
         try:
             return self._f(x)
         except SystemExit as end:
-            raise RuntimeError(f"it called sys.exit({'' if end.code is None else end.code})") from end
+            raise RuntimeError(exit_in_words(end)) from end
 
     def _value(self, point: NDArray[np.float64]) -> float:
         value = self.trial(point.copy())
@@ -74,6 +74,11 @@ class Function:
 
     def __repr__(self) -> str:
         return f"<{self.name} on {self.box!r}>"
+
+
+def exit_in_words(end: SystemExit) -> str:
+    """Return what a function did that would have ended the program."""
+    return f"it called sys.exit({'' if end.code is None else end.code})"
 
 
 def load_function(reference: str) -> Callable[[NDArray[np.float64]], Any]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from surehold.errors import InputError
 from surehold.optimization.evaluation import evaluate
+from surehold.problems.function import exit_in_words
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
 
@@ -41,7 +42,7 @@ def trial_function(f: Callable[[Any], Any], space: SearchSpace) -> Callable[[Map
         except InputError as error:  # cannot be called at all
             return Outcome(np.nan, str(error))
         except SystemExit as end:  # it would end the worker, and each one that takes the trial up
-            return Outcome(np.nan, f"it called sys.exit({'' if end.code is None else end.code})")
+            return Outcome(np.nan, exit_in_words(end))
 
     return attempt
 

@@ -188,11 +188,9 @@ def _flat_sides(vertices: Array) -> Array:
 
 
 def _smallest_box(vertices: Array, normals: Array, own: Array) -> Array:
-    """Return the axes (3, 3) of the smallest box of vertices (v, 3) with a face along a normal (n, 3), named as `own`.
-
-    An edge of the smallest rectangle around points of a plane lies on an edge of their hull (Freeman and Shapira 1975).
-    """
+    """Return the axes (3, 3) of the smallest box of vertices (v, 3) with a face along a normal (n, 3), named by `own`."""
     from scipy.spatial import ConvexHull
+    from trimesh.bounds import oriented_bounds_2D
 
     if not len(normals):
         return own
@@ -202,14 +200,8 @@ def _smallest_box(vertices: Array, normals: Array, own: Array) -> Array:
         across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
         across /= np.linalg.norm(across)
         frame = np.column_stack([across, np.cross(normal, across), normal])
-        outline = corners @ frame[:, :2]
-        outline = outline[ConvexHull(outline).vertices]
-        edges = np.roll(outline, -1, axis=0) - outline
-        edges /= np.linalg.norm(edges, axis=1)[:, None]
-        width = np.ptp(outline @ edges.T, axis=0) * np.ptp(outline @ np.array([-edges[:, 1], edges[:, 0]]), axis=0)
-        least = int(np.argmin(width))
-        volume = float(width[least] * np.ptp(corners @ normal))
+        turn, rectangle = oriented_bounds_2D(corners @ frame[:, :2])
+        volume = float(np.prod(rectangle) * np.ptp(corners @ normal))
         if volume < (1.0 - 1e-9) * best:
-            (c, s), best = edges[least], volume
-            axes = frame @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+            best, axes = volume, np.column_stack([frame[:, :2] @ turn[:2, :2].T, normal])
     return own @ _named(own.T @ axes)[1]

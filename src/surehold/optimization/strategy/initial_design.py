@@ -44,7 +44,7 @@ def drawn_to(
     before: Iterable[NDArray[np.float64]] = (),
     snap: Callable[[NDArray[np.float64]], NDArray[np.float64]] = np.asarray,
     allowed: Callable[[NDArray[np.float64]], NDArray[np.bool_]] = lambda U: np.ones(len(U), dtype=bool),
-    pool: Iterable[NDArray[np.float64]] = (),
+    pool: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Return a design (n, d), moved to a guess (d,) of where the optimum is; nan in coordinates of which none is made.
 
@@ -55,7 +55,8 @@ def drawn_to(
     where they are tried.
     """
     known = ~np.isnan(guess)
-    others = [place for place in (np.where(known, guess, point) for point in pool) if allowed(place[None])[0]]
+    others = np.where(known, guess, points[:0] if pool is None else pool)
+    others = others[allowed(others)]
     result, tried = points.copy(), {_trial(snap(point)) for point in before}
     for i, point in enumerate(points):
         if i % GUESS_TURN != GUESS_TURN - 1:

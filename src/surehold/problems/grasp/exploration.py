@@ -134,10 +134,8 @@ class Exploration:
         self.belief = belief
         self.X: Array = np.empty((0, problem.box.dimension))  #: trials told, in the units of the box
         self.y: Array = np.empty(0)  #: their qualities
-        self._known, self._felt = (
-            belief.surface.observations,
-            Observations(),
-        )  # before the first touch; since, bounds apart
+        self._known: Final = belief.surface.observations  # before the first touch
+        self._felt = Observations()  # since, bounds apart
         self._seen, self._free = belief.free, np.empty((0, 4))
 
     def ask(self, pending: Array | None = None) -> Array:
