@@ -188,7 +188,10 @@ def _flat_sides(vertices: Array) -> Array:
 
 
 def _smallest_box(vertices: Array, normals: Array, own: Array) -> Array:
-    """Return the axes (3, 3) of the smallest box of vertices (v, 3) with a face along a normal (n, 3), named by `own`."""
+    """Return the axes (3, 3) of the smallest box of vertices (v, 3) that has a face along a normal (n, 3).
+
+    They are named after the axes of `own` (3, 3) that they are nearest to.
+    """
     from scipy.spatial import ConvexHull
     from trimesh.bounds import oriented_bounds_2D
 
