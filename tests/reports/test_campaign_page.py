@@ -74,6 +74,16 @@ def test_the_climb_out_of_the_initial_design_does_not_press_the_rest_flat():
     assert axes.get_ylim()[0] > 0.0
 
 
+def test_trials_are_counted_in_whole_numbers_and_inputs_are_not():
+    trials = np.arange(1.0, 21.0)
+    counted, inputs = (draw_picture(Picture("p", "", (Panel("p", lines=(Line(x, x),)),))) for x in (trials, X / 10.0))
+    ticks = counted.axes[0].get_xticks()
+    assert len(ticks) > 3
+    assert np.all(ticks % 1.0 == 0.0)
+    assert counted.axes[0].get_xlim() == (1.0, 20.0)
+    assert np.any(inputs.axes[0].get_xticks() % 1.0 != 0.0)
+
+
 @pytest.mark.parametrize("panels", [1, 2, 4])
 def test_the_names_of_eight_methods_fit_into_the_figure(panels):
     names = ("surehold robust", "surehold", "Optuna GPSampler", "Optuna TPE", "Optuna CMA-ES", "BoTorch", "random")

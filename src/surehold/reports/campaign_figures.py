@@ -6,6 +6,7 @@ import numpy as np
 
 from surehold.reports.campaign_report import Panel, Picture
 from surehold.reports.drawing import PALETTE, style
+from surehold.reports.scales import set_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +65,8 @@ def _draw_lines(axes: "Axes", panel: Panel) -> None:
         axes.axvspan(0.0, panel.initial, color=PALETTE["grid"], alpha=0.45, linewidth=0, zorder=0)
     everything = [line.x for line in panel.lines]
     if everything:
-        axes.set_xlim(min(x.min() for x in everything), max(x.max() for x in everything))
+        every = np.concatenate(everything)
+        set_scale(axes, "x", (every.min(), every.max()), whole=bool(np.all(every % 1.0 == 0.0)))  # trials are counted
     if panel.initial > 0.0 and panel.lines:  # the climb out of the initial design would press the rest flat
         late = [line.y[line.x >= panel.initial] for line in panel.lines]
         late += [edge[band.x >= panel.initial] for band in panel.bands for edge in (band.low, band.high)]
