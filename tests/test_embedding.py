@@ -63,6 +63,21 @@ def test_dividing_the_bins_keeps_every_trial_where_it_was():
     assert sorted(set(sizes)) == [2, 8, 20]
 
 
+def test_bins_are_divided_while_trials_are_under_way():
+    search = NestedEmbedding(sh.Box.unit(20), trials=40, dimension=2, seed=3)
+    under_way, sizes = [search.ask() for _ in range(3)], []
+    for _ in range(40):
+        x = under_way.pop(0)
+        search.tell(x, _hidden(x))
+        under_way.append(search.ask())
+        sizes.append(search.dimension)
+        for waiting, (x, _, place) in zip(under_way, search._asked, strict=True):
+            np.testing.assert_array_equal(x, waiting)
+            np.testing.assert_allclose(search._spread(place), x)
+    assert sorted(set(sizes)) == [2, 8, 20]
+    assert len(search._optimizer.pending) == 3
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [

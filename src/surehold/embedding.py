@@ -142,7 +142,7 @@ class NestedEmbedding:
 
     def ask(self) -> NDArray[np.float64]:
         """Return the next trial (D,), in the box's units."""
-        if not self._asked and len(self._ends) > 1 and len(self._values) >= self._ends[0]:
+        if len(self._ends) > 1 and len(self._values) >= self._ends[0]:
             del self._ends[0]
             self._divide()
         z = self._optimizer.ask()
@@ -172,13 +172,17 @@ class NestedEmbedding:
         return u
 
     def _divide(self) -> None:
-        """Divide every bin; a trial keeps its place, for the parts of a bin all take its value."""
+        """Divide every bin; a trial keeps its place, for the parts of a bin all take its value.
+
+        So do those under way: where several are always, or one is never told, a stage would not end otherwise.
+        """
         parts = [np.array_split(self._rng.permutation(members), min(_PARTS, len(members))) for members in self._bins]
         origin = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
         self._bins = [np.sort(members) for part in parts for members in part]
         self._places = [place[origin] for place in self._places]
         self._optimizer = self._new()
-        self._optimizer.restore(self._places, self._values)
+        self._asked = [(x, turn, z[origin]) for x, turn, z in self._asked]
+        self._optimizer.restore(self._places, self._values, pending=[z for _, _, z in self._asked])
 
     def _new(self) -> Optimizer:
         inner = Box({f"z{i + 1}": (-1.0, 1.0) for i in range(len(self._bins))})
