@@ -1,4 +1,6 @@
+import copy
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -46,6 +48,37 @@ def test_a_loaded_optimizer_goes_on_as_the_saved_one(tmp_path, settings):
     assert loaded.direction == saved.direction
     assert np.array_equal(loaded.recommend().x, saved.recommend().x)
     assert np.array_equal(loaded.ask(2), saved.ask(2))
+
+
+def few(x):
+    """Is below a place: of {name: value}, as of x (d,)."""
+    return (x["n"] if isinstance(x, dict) else x[0]) < 9
+
+
+def twentieth(x):
+    """Return deviations of a twentieth, everywhere."""
+    return np.full(len(x), 0.05)
+
+
+@pytest.mark.parametrize(
+    ("variables", "settings"),
+    [
+        ({"x": (0.0, 1.0), "y": (0.0, 1.0)}, {"fixed": {"y": 0.5}}),
+        ({"n": (0, 9, "int"), "c": ["a", "b"]}, {"fixed": {"c": "b"}}),
+        ({"n": (0, 20, "int")}, {"allowed": few}),
+        ({"n": (1.0, 20.0, "log")}, {"allowed": "n <= 10"}),
+        ({"x": (0.0, 1.0)}, {"allowed": few, "input_noise": InputNoise.varying(twentieth)}),
+    ],
+    ids=["fixed", "fixed choice", "function by name", "weights of a logarithm", "varying noise"],
+)
+@pytest.mark.parametrize("copied", [lambda o: pickle.loads(pickle.dumps(o)), copy.deepcopy], ids=["pickle", "deepcopy"])
+def test_a_pickled_optimizer_goes_on_as_the_one_it_was_made_of(variables, settings, copied):
+    optimizer = Optimizer(Box(variables), n_initial=3, seed=1, **settings)
+    for i in range(4):
+        optimizer.tell(optimizer.ask_trial(), float(i % 3))
+    other = copied(optimizer)
+    np.testing.assert_array_equal(other.ask_trial().x, optimizer.ask_trial().x)
+    assert other.recommend().mean == optimizer.recommend().mean
 
 
 def test_an_infinite_limit_is_none(tmp_path):

@@ -7,13 +7,14 @@ have been perturbed.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surehold.optimization.box import Box
-from surehold.optimization.known_coordinates import fixed_of
+from surehold.optimization.known_coordinates import Fixed, fixed_of
 from surehold.optimization.surrogates.protocol import FitDiagnostics, Moments, Posterior, Regions, means
 
 Allowed = Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None
@@ -77,12 +78,13 @@ def lattice_of(box: Box, fixed: Mapping[str, Any] | None = None) -> Lattice | No
     constant = fixed_of(box, fixed)
     if constant is None:
         return lattice
-    held, values = constant.held, constant.values
+    smooth = ~constant.held if lattice is None else lattice.smooth & ~constant.held
+    return Lattice(partial(_with_fixed, constant, lattice), smooth)
 
-    def snap(U: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.where(held, values, U if lattice is None else lattice.snap(U))
 
-    return Lattice(snap, ~held if lattice is None else lattice.smooth & ~held)
+def _with_fixed(constant: Fixed, lattice: Lattice | None, U: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the nearest points (..., d) that can be tried with the fixed values."""
+    return np.where(constant.held, constant.values, U if lattice is None else lattice.snap(U))
 
 
 class LatticePosterior:

@@ -4,8 +4,9 @@ They differ where a box is not plain: the coordinate of a logarithmic variable i
 several.
 """
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +30,7 @@ def of_coordinates(box: Box, rule: Rule) -> Rule:
     if box.plain:
         return rule
     if not isinstance(rule, Linear):
-        function = rule
-
-        def answers(x: NDArray[np.float64]) -> Any:
-            return function(box.as_dict(x))
-
-        answers.__name__ = getattr(rule, "__name__", "a function")
-        return answers
+        return _Named(box, rule, getattr(rule, "__name__", "a function"))
     variables = {variable.name: variable for variable in box.variables}
     for name in rule.weights:
         if name not in variables:
@@ -44,14 +39,25 @@ def of_coordinates(box: Box, rule: Rule) -> Rule:
             raise InputError(f"'{name}' is a choice among names, which a linear constraint cannot weigh; leave it out.")
     if not any(isinstance(v := variables[name], Choice) or v.log for name in rule.weights):
         return rule
+    return _Named(box, partial(_holds, rule), str(rule))
+
+
+class _Named:
+    """A function of {name: value} as one of the point x (d,); a class, so that an optimizer can be pickled."""
+
+    def __init__(self, box: Box, function: Callable[[Any], Any], name: str):
+        self.__name__ = name
+        self._box: Final = box
+        self._function: Final = function
+
+    def __call__(self, x: NDArray[np.float64]) -> Any:
+        """Return what the function says of x."""
+        return self._function(self._box.as_dict(x))
+
+
+def _holds(rule: Linear, values: Mapping[str, Any]) -> bool:
     low = -np.inf if rule.lower is None else rule.lower
     high = np.inf if rule.upper is None else rule.upper
-
-    def holds(x: NDArray[np.float64]) -> bool:
-        values = box.as_dict(x)
-        parts = [weight * float(values[name]) for name, weight in rule.weights.items()]
-        slack = ROUNDING * sum(map(abs, parts))
-        return bool(low - slack <= sum(parts) <= high + slack)
-
-    holds.__name__ = str(rule)
-    return holds
+    parts = [weight * float(values[name]) for name, weight in rule.weights.items()]
+    slack = ROUNDING * sum(map(abs, parts))
+    return bool(low - slack <= sum(parts) <= high + slack)

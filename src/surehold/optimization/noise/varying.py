@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ class Varying:
 
         All variables get points: one that is exact at any number of places may be noisy between them.
         """
-        return quadrature(rule, np.eye(box.dimension), k, exponent=exponent), lambda U: self._roots(box, U)
+        return quadrature(rule, np.eye(box.dimension), k, exponent=exponent), partial(self._roots, box)
 
     def _roots(self, box: Box, U: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.array([root_of(self.unit_covariance(box, x)) for x in box.from_unit(np.clip(U, 0.0, 1.0))])
