@@ -92,6 +92,8 @@ def test_bins_are_divided_while_trials_are_under_way():
         (lambda: RandomEmbedding(sh.Box({"x": (0, 1)}, uncontrolled={"load": [1.0, 2.0]}), 1), "nobody sets"),
         (lambda: NestedEmbedding(sh.Box.unit(3), 9, noise="told"), "tell no noise"),
         (lambda: RandomEmbedding(sh.Box.unit(3), 2, seed=-1), "seed is -1"),
+        (lambda: RandomEmbedding(sh.Box.unit(3), 2, criteron="ei"), "did you mean 'criterion'"),
+        (lambda: NestedEmbedding(sh.Box.unit(3), 9, criteron="ei"), "did you mean 'criterion'"),
         (lambda: RandomEmbedding(sh.Box.unit(3), 2).best(), "no trial has given a value"),
         (lambda: RandomEmbedding(sh.Box.unit(3), 2).tell(np.zeros(3), 1.0), "was not asked for"),
     ],

@@ -103,6 +103,11 @@ def test_what_is_refused(vocs, message):
         RobustGenerator(VOCS(**vocs))
 
 
+def test_a_misspelt_setting_is_named():
+    with pytest.raises(InputError, match="did you mean 'criterion'"):
+        RobustGenerator(gm_vocs(), criteron="ei")
+
+
 def test_the_direction_has_one_owner():
     with pytest.raises(InputError, match="those of its vocs"):
         RobustGenerator(gm_vocs(), direction="minimize")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from surehold.errors import InputError
 from surehold.optimization.assembly import whole_number
 from surehold.optimization.box import Box
-from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.optimizer import Optimizer, check_settings
 
 __all__ = ["NestedEmbedding", "RandomEmbedding"]
 
@@ -199,6 +199,7 @@ def _check(box: Box, dimension: int, seed: int, settings: dict[str, Any]) -> Non
     if isinstance(dimension, bool) or not isinstance(dimension, int) or not 1 <= dimension <= box.dimension:
         raise InputError(f"dimension is {dimension!r}; give 1 to {box.dimension}, the number of variables.")
     whole_number("seed", seed, 0)
+    check_settings(settings)
     for name in ("input_noise", "fixed", "guess", "initial_points", "allowed"):
         if settings.get(name) is not None:
             raise InputError(f"{name} is about the variables of the box, not of an embedding; leave it out.")

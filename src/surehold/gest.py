@@ -14,7 +14,7 @@ from surehold.errors import InputError
 from surehold.extras import require
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
-from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.optimizer import Optimizer, check_settings
 from surehold.optimization.points import numbers_of
 from surehold.optimization.recommendation import Recommendation
 from surehold.optimization.trial_inputs import trial_input
@@ -80,6 +80,7 @@ class RobustGenerator(Generator):
 
     def __init__(self, vocs: VOCS, *, input_noise: InputNoise | None = None, seed: int = 0, **settings: Any):
         super().__init__(vocs)
+        check_settings(settings)
         if "direction" in settings or "constraints" in settings:
             raise InputError("direction and constraints of a generator are those of its vocs; leave them out.")
         if settings.get("outcome", "value") != "value" or settings.get("noise") == "told":

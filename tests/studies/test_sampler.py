@@ -183,6 +183,8 @@ def test_parallel_threads_and_copies():
         ({"seed": -1}, "seed"),
         ({"search_space": SPACE, "input_noise": sh.InputNoise({"x": 0.1})}, "says nothing about k"),
         ({"criterion": "robust_ei"}, "needs input noise"),
+        ({"criteron": "ei"}, "did you mean 'criterion'"),
+        ({"constraints_func": len}, "has no constraints_func; limits are constraints="),
     ],
 )
 def test_bad_settings_are_refused_at_once(arguments, message):

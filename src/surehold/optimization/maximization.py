@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from inspect import signature
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
@@ -12,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surehold.amounts import amount
-from surehold.errors import InputError, SureholdError, unknown_name
+from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
 from surehold.optimization.evaluation import Evaluation, in_processes, one_by_one
 from surehold.optimization.limits import returned_outputs
-from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.optimizer import Optimizer, check_settings
 from surehold.optimization.progress import progress_bar
 from surehold.optimization.recommendation import Recommendation, in_digits, outside_in_words, place
 
@@ -308,11 +307,7 @@ def _optimizer(box: Box, n_trials: int, settings: dict[str, Any]) -> Optimizer:
             "a function is called at the conditions that are asked for, and tells none; leave conditions out, or make "
             "an Optimizer, and tell(x, y, reached=...)."
         )
-    named = [name for function in (Optimizer, maximize) for name in signature(function).parameters]
-    known = [name for name in named if name not in ("f", "box", "settings")]
-    for name in settings:
-        if name not in known:
-            raise unknown_name("setting", name, known)
+    check_settings(settings, maximize)
     optimizer = Optimizer(box, **settings)
     if settings.get("n_initial") is None and optimizer.n_initial > n_trials:
         fewer: dict[str, Any] = {**settings, "n_initial": n_trials}

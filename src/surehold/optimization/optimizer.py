@@ -5,7 +5,8 @@ Legend
     t   trials told, failed ones included
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from inspect import signature
 from typing import TYPE_CHECKING, Any, Final, Literal, overload
 
 import numpy as np
@@ -38,7 +39,7 @@ from surehold.optimization.trials import AskedTrial, Trials
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Optimizer"]
+__all__ = ["Optimizer", "check_settings"]
 
 _MOST_AT_ONCE = 100_000  # trials asked for in one call; more is a slip of the pen
 
@@ -465,3 +466,12 @@ class Optimizer(Record):
 
     def _rng(self, purpose: int, position: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, purpose, position])
+
+
+def check_settings(settings: Mapping[str, Any], *owners: Callable[..., Any]) -> None:
+    """Raise InputError for a name that is no setting of an `Optimizer`, nor one of the owners' own arguments."""
+    named = [name for function in (Optimizer, *owners) for name in signature(function).parameters]
+    known = [name for name in named if name not in ("f", "box", "settings")]
+    for name in settings:
+        if name not in known:
+            raise unknown_name("setting", name, known)

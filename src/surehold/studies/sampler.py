@@ -22,7 +22,7 @@ from surehold.defaults import MANY, SUCCESS_PLACES
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise, checked_input_noise
-from surehold.optimization.optimizer import Optimizer
+from surehold.optimization.optimizer import Optimizer, check_settings
 from surehold.optimization.surrogates.protocol import Surrogate
 from surehold.studies.allowed import allowed_in
 from surehold.studies.history import History, Reader
@@ -89,6 +89,12 @@ class Sampler(BaseSampler):
         warn_independent_sampling: bool = True,
         **settings: Any,
     ):
+        if "constraints_func" in settings:
+            raise InputError(
+                "a sampler has no constraints_func; limits are constraints={'torque': (None, 3.0)}, of what a trial "
+                "says by trial.set_user_attr('torque', 3.1)."
+            )
+        check_settings(settings)
         if "direction" in settings:
             raise InputError("a sampler has no direction of its own; say optuna.create_study(direction=...).")
         if settings.get("outcome") == "preference":
