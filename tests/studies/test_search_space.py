@@ -155,6 +155,14 @@ def test_infinite_distributions_are_refused():
         SearchSpace({"x": FloatDistribution(0.0, math.inf)})
 
 
+def test_choices_that_optuna_takes_for_one_are_refused():
+    equal = CategoricalDistribution([None, True, 1, "x"])
+    assert equal.to_external_repr(equal.to_internal_repr(1)) is True  # asked for 1, stored as True, asked for again
+    with pytest.raises(InputError, match="the choices True and 1, which are equal"):
+        SearchSpace({"a": equal})
+    assert SearchSpace({"a": CategoricalDistribution([None, True, 2, "1"])}).box is not None
+
+
 def test_bounds_in_single_precision_are_the_bounds():
     single = float(np.float32(0.05))
     assert single > 0.05

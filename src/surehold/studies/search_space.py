@@ -45,7 +45,8 @@ class SearchSpace:
     Raises
     ------
     InputError
-        If there is no parameter, bounds are reversed or not finite, or a variable of the box is uncontrolled.
+        If there is no parameter, bounds are reversed or not finite, two choices are equal, or a variable of the box is
+        uncontrolled.
     """
 
     def __init__(self, parameters: Box | Mapping[str, Any]):
@@ -173,12 +174,24 @@ def _distribution(name: str, value: Any) -> BaseDistribution:
 
 def _variable(name: str, distribution: BaseDistribution) -> Variable:
     if isinstance(distribution, CategoricalDistribution):
+        _check_different(name, distribution)
         return Choice(name, tuple(distribution.choices))
     if isinstance(distribution, IntDistribution):
         return Number(name, distribution.low, distribution.high, distribution.step, distribution.log, True)
     if isinstance(distribution, FloatDistribution):
         return Number(name, distribution.low, distribution.high, distribution.step or 0.0, distribution.log)
     raise InputError(f"parameter '{name}' has the unknown distribution {distribution!r}.")
+
+
+def _check_different(name: str, distribution: CategoricalDistribution) -> None:
+    """Raise InputError where two choices are equal: trials of the second one are stored as of the first one."""
+    for place, choice in enumerate(distribution.choices):
+        first = int(distribution.to_internal_repr(choice))
+        if first != place:
+            raise InputError(
+                f"parameter '{name}' has the choices {distribution.choices[first]!r} and {choice!r}, which are equal: "
+                "Optuna stores both as the first one. Leave one out, or name them by texts."
+            )
 
 
 def _only_value(distribution: BaseDistribution) -> Any:
