@@ -7,8 +7,9 @@ import pytest
 from scipy import stats
 
 import surehold as sh
+from surehold.errors import InputError
 from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.recommendation import expectation_at, in_digits, outside_in_words
+from surehold.optimization.recommendation import Outcome, expectation_at, in_digits, outside_in_words
 
 LINE = sh.Box({"x": (-1.0, 1.0)})
 
@@ -24,6 +25,14 @@ def test_one_execution_contains_the_observation_noise_and_the_mean_does_not():
     assert best.std == pytest.approx(0.45, rel=0.1)
     assert best.expectation.std < 0.15
     assert best.expectation.quantile(0.005) < 42.0 < best.expectation.quantile(0.995)
+
+
+@pytest.mark.parametrize("level", [-0.1, 5, 95.0, float("nan"), None, "0.05", True])
+def test_a_quantile_is_of_a_share_of_executions(level):
+    outcome = Outcome(np.array([1.0, 2.0]), np.array([0.5, 0.5]))
+    with pytest.raises(InputError, match="give a share of executions from 0 to 1"):
+        outcome.quantile(level)
+    assert outcome.quantile(np.float64(0.5)) == pytest.approx(1.5)
 
 
 def test_known_noise_widens_one_execution_by_its_variance():

@@ -74,7 +74,11 @@ class Outcome:
         return self._average(ndtr((value - self.means) / scale))
 
     def quantile(self, level: float) -> float:
-        """Return the value below which the share `level` of the distribution lies, by bisection."""
+        """Return the value below which the share `level` of the distribution lies, by bisection.
+
+        Raises InputError for a level outside of [0, 1].
+        """
+        _check_share(level)
         low = float((self.means - 10.0 * self.stds).min())
         high = float((self.means + 10.0 * self.stds).max())
         for _ in range(60):
@@ -178,9 +182,14 @@ class Recommendation:
         Over what is not known: the share itself is that under the input noise. Raises InputError for a level outside
         of [0, 1].
         """
-        if not 0.0 <= level <= 1.0:
-            raise InputError(f"level is {level!r}; give a share of executions from 0 to 1.")
+        _check_share(level)
         return 1.0 - self.expectation.probability_below(level)
+
+
+def _check_share(level: Any) -> None:
+    """Raise InputError where a level is no share of executions, such as 95 for 95 %."""
+    if isinstance(level, bool) or not isinstance(level, (int, float, np.number)) or not 0.0 <= level <= 1.0:
+        raise InputError(f"level is {level!r}; give a share of executions from 0 to 1, such as 0.95.")
 
 
 def outliers_in_words(numbers: Sequence[int]) -> str:
