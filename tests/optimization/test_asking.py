@@ -67,3 +67,24 @@ def test_where_every_place_is_under_way_noisy_ones_are_asked_for_again():
         trial = few.ask_trial()
         few.tell(trial, float(trial.parameters["grip"] == "pinch"))
     assert {trial.parameters["grip"] for trial in few.ask_trial(4)} <= {"pinch", "power"}
+
+
+def test_of_several_trials_asked_for_all_are_or_none():
+    stopped = []
+
+    def allowed(x):
+        if stopped and len(search.pending) == 2:
+            raise KeyboardInterrupt
+        return True
+
+    box, always = sh.Box({"x": (0.0, 1.0)}), lambda x: True
+    search, other = (sh.Optimizer(box, n_initial=2, seed=0, allowed=rule) for rule in (allowed, always))
+    for x in np.linspace(0.1, 0.9, 4):
+        for one in (search, other):
+            one.tell([x], float(x))
+    stopped.append(True)
+    with pytest.raises(KeyboardInterrupt):
+        search.ask(3)
+    assert len(search.pending) == 0
+    stopped.clear()
+    np.testing.assert_array_equal(search.ask(3), other.ask(3))

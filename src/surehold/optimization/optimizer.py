@@ -285,9 +285,15 @@ class Optimizer(Record):
         return self._ask_one(number) if n is None else self._ask(n, number)
 
     def _ask(self, n: int, number: int | None) -> list[AskedTrial]:
-        return [
-            self._ask_one(None if number is None else number + i) for i in range(whole_number("n", n, 1, _MOST_AT_ONCE))
-        ]
+        asked: list[AskedTrial] = []
+        try:
+            for i in range(whole_number("n", n, 1, _MOST_AT_ONCE)):
+                asked.append(self._ask_one(None if number is None else number + i))
+        except BaseException:  # Ctrl-C, too: nobody would make those that were asked for before it
+            for trial in asked:
+                self._trials.forget(trial)
+            raise
+        return asked
 
     def _ask_one(self, number: int | None) -> AskedTrial:
         position = self._trials.next_number if number is None else whole_number("number", number, 0)
