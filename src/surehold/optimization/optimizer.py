@@ -48,7 +48,8 @@ class Optimizer(Record):
     """Bayesian optimization by ask and tell.
 
     What `ask` returns depends on the settings, the trials told, the pending trials and the seed alone: an optimizer
-    rebuilt from stored trials asks the same next point. (The thesis presets continue their chains and do not.)
+    loaded from a file asks the same next point. One that is restored from X does so up to rounding, see `restore`. (The
+    thesis presets continue their chains and do neither.)
 
     Parameters
     ----------

@@ -196,7 +196,8 @@ class Record(ABC):
         `constraints`, NaN where not measured. `of` (t,) are the executions of which y is the share of successes, 1 each
         where None. `noise` (t,) are the standard deviations told. `preferences` (p, 2) are rows of X that
         were compared, the better one first; y is counted from them then. What is asked next is what an optimizer asks
-        that was told these trials in this order.
+        that was told these trials in this order. One that had asked for them itself knows them in the unit cube, where
+        X is they but for rounding: that may lead a search elsewhere. `save` and `load` keep the last bit.
 
         Raises
         ------
