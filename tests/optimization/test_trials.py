@@ -219,6 +219,7 @@ SURROGATES = ["gp", "tgp", "local_global", TreedGaussianProcess(min_leaf=4, tree
     "surrogate", SURROGATES, ids=lambda surrogate: surrogate if isinstance(surrogate, str) else "tree_object"
 )
 @pytest.mark.parametrize("robust", [False, True])
+@pytest.mark.filterwarnings("ignore:The trial is told to have reached")
 def test_reached_anywhere_does_no_harm(surrogate, robust):
     """Far away trials, told with the highest and the lowest values, spoil neither the model nor the search."""
     box = Box.unit(2)
@@ -274,3 +275,24 @@ def test_restored_with_trials_outside():
     restored.restore(told.X, told.y, reached=told.reached)
     assert np.array_equal(restored.reached, told.reached)
     np.testing.assert_allclose(restored.ask(), told.ask(), atol=1e-6)
+
+
+def test_a_reached_input_of_another_unit_is_said():
+    optimizer = Optimizer(BOX, seed=0, n_initial=3, **in_both(True))
+    optimizer.tell(optimizer.ask(), 0.2, reached=[0.09, 0.03])  # out of the box, and no farther than it is wide
+    assert not optimizer.recommend().warning
+    with pytest.warns(UserWarning, match=r"The trial is told to have reached dy = 12, .* -0\.03 to 0\.03") as told:
+        optimizer.tell(optimizer.ask(), 0.4, reached=[0.01, 12.0])  # dy in millimeters
+    assert told[0].filename == __file__
+    warning = optimizer.recommend().warning
+    assert warning.startswith("1 of 2 trials is told to have reached dy = 12,")
+    assert warning.endswith("Check the unit of what is reached.")
+
+
+def test_conditions_and_logarithms_may_be_far_away():
+    box = Box({"force": (0.1, 10.0, "log"), "load": (0.0, 1.0)}, uncontrolled={"load": [0.2, 0.4, 0.9]})
+    optimizer = Optimizer(box, seed=0)
+    optimizer.tell({"force": 1.0, "load": 0.5}, 0.3, reached={"force": 500.0, "load": 70.0})  # within two decades
+    assert not optimizer.recommend().warning
+    with pytest.warns(UserWarning, match=r"reached force = 2000, .* 0\.1 to 10 "):
+        optimizer.tell({"force": 1.0, "load": 0.5}, 0.3, reached={"force": 2000.0, "load": 0.5})

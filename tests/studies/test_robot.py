@@ -647,3 +647,16 @@ def test_what_is_recommended_can_be_commanded(robot):
 def test_settings_that_no_optimizer_has_are_refused_when_the_study_is_described():
     with pytest.raises(InputError, match="setting of an optimizer 'sed' is unknown; did you mean 'seed'"):
         StudySettings(SearchSpace(BOX), None, {}, {"sed": 0})
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_what_was_reached_in_another_unit_is_said(tmp_path, asked):
+    settings = StudySettings(SearchSpace({"dx": (-0.05, 0.05), "grip": ["pinch", "power"]}), None, {"dx": "m"})
+    study = RobotStudy.create("bench", settings, str(tmp_path / "bench.log"))
+    tell, trial = (study.tell, study.ask().id) if asked else (study.add, {"dx": 0.01, "grip": "power"})
+    with pytest.warns(UserWarning, match=r"The trial is told to have reached dx = 11, .* -0\.05 to 0\.05") as told:
+        tell(trial, 0.4, reached={"dx": 11.0})
+    assert told[0].filename == __file__
+    study.add({"dx": 0.02, "grip": "power"}, 0.3, reached={"dx": 0.07})
+    assert study.recommend().warning.startswith("1 of 2 trials is told to have reached dx = 11")
+    study.close()

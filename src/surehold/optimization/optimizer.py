@@ -344,7 +344,7 @@ class Optimizer(Record):
                 u, observed = self._snapped(ranking.best(posterior, history, rng, strict)), np.nan
             best = int(np.argmax(history.observed))
             highest, top = (history.tried[best], float(history.observed[best])), int(np.nanargmax(self._trials.values))
-            no_answer = ""
+            no_answer, doubt = "", self.diagnosis()
             if self._trials.values[top] > highest[1]:
                 highest = self._trials.reached[top], float(self._trials.values[top])
                 no_answer = self._trials.why_no_answer(top)
@@ -363,7 +363,7 @@ class Optimizer(Record):
                 self._sign,
                 tuple(np.flatnonzero(self._trials.outliers).tolist()),
                 self._model.execution_noise(self._trials, reached),
-                "" if (diagnosis := self.diagnosis()) is None else diagnosis.warning,
+                " ".join(said for said in (self._trials.astray, "" if doubt is None else doubt.warning) if said),
                 self.risk,
                 ranking.judged(posterior, highest[0], u),
                 no_answer,

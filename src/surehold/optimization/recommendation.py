@@ -116,7 +116,8 @@ class Recommendation:
     refused
         Why the best observed trial was not recommended; empty where it was.
     warning
-        What is wrong with the model that all this rests on, see `diagnosis.Diagnosis`; empty where nothing is.
+        What is wrong with the trials or the model that all this rests on: inputs that were reached far outside of the
+        box, and see `diagnosis.Diagnosis`; empty where nothing is.
     outliers
         Trials, from 0 in the order told, whose values are too far on the bad side of all others to be believed.
     execution : Outcome

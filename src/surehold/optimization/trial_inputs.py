@@ -5,12 +5,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surehold.amounts import amount
 from surehold.defaults import ROUNDED
 from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.variables import Number
 
 __all__ = [
+    "astray_in_words",
     "check_levels",
     "check_place",
     "check_tried",
@@ -23,6 +25,9 @@ __all__ = [
 # A reached input farther away counts as so many box widths away: nothing is learnt from the difference, and squares of
 # it stay finite.
 _FARTHEST: Final = 1e6
+
+# A reached input that is farther out of the box than this many box widths is rather of another unit than astray.
+_ASTRAY: Final = 1.0
 
 
 def trial_inputs(box: Box, name: str, X: ArrayLike, inside: bool) -> NDArray[np.float64]:
@@ -105,6 +110,29 @@ def check_tried(box: Box, points: NDArray[np.float64], nearest: NDArray[np.float
             f"initial_points hold {box.as_given(given)}, which is never tried: the nearest that can be is "
             f"{box.as_dict(other)}. Give levels of variables in steps, and the values of fixed ones."
         )
+
+
+def astray_in_words(box: Box, U: NDArray[np.float64]) -> str:
+    """Return what a user should know of reached inputs U (t, d) that are farther out of the unit cube than it is wide.
+
+    Empty where none is. Conditions that nobody sets may lie anywhere.
+    """
+    beyond = np.maximum(-U, U - 1.0)
+    number = {box.columns(v.name).start: v for v in box.variables if isinstance(v, Number)}
+    beyond[:, [column not in number for column in range(box.dimension)]] = 0.0
+    if box.uncontrolled is not None:
+        beyond[:, box.uncontrolled.held] = 0.0
+    far = np.flatnonzero(np.any(beyond > _ASTRAY, axis=1))
+    if not len(far):
+        return ""
+    variable = number[int(np.argmax(beyond[far[0]]))]
+    value = box.as_given(box.from_unit(U[far[0]]))[variable.name]
+    trials = f"{len(far)} of {amount(len(U), 'trial')} {'is' if len(far) == 1 else 'are'}"
+    return (
+        f"{trials if len(U) > 1 else 'The trial is'} told to have reached "
+        f"{variable.name} = {value:.4g}, farther from its range of {variable.low:g} to {variable.high:g} than that is "
+        "wide: next to nothing is learnt of the box there. Check the unit of what is reached."
+    )
 
 
 def _near(box: Box, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ A trial is known by its number, or by its place: what is told at x belongs to th
 `ROUNDED` box widths. Numbers count from 0; one that was forgotten is given out again before any new one.
 """
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -19,7 +20,7 @@ from surehold.optimization.box import Box
 from surehold.optimization.known_coordinates import Fixed
 from surehold.optimization.limits import Limit, checked_outputs
 from surehold.optimization.stored_trials import checked_columns
-from surehold.optimization.trial_inputs import check_levels, check_place, trial_input, trial_inputs
+from surehold.optimization.trial_inputs import astray_in_words, check_levels, check_place, trial_input, trial_inputs
 from surehold.optimization.values import (
     number_of,
     outliers_among,
@@ -153,6 +154,11 @@ class Trials:
         )
 
     @property
+    def astray(self) -> str:
+        """What a user should know of inputs that were reached far outside of the box; empty where none was."""
+        return astray_in_words(self._box, self.reached)
+
+    @property
     def places(self) -> NDArray[np.float64]:
         """Reached inputs (t, d), those outside of the unit cube replaced by the nearest points of it."""
         return np.clip(self.reached, 0.0, 1.0)
@@ -232,6 +238,8 @@ class Trials:
             self._numbers.append(self.next_number if number is None else number)
         if number is not None:
             del self._pending[number]
+        if reached is not None and (astray := astray_in_words(self._box, actual[None, :])):
+            warnings.warn(astray, stacklevel=3)
 
     def compare(self, better: Any, worse: Any) -> None:
         """Record that an input was preferred to another one; see `Optimizer.tell_preference`.

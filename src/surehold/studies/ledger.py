@@ -177,6 +177,8 @@ class Ledger:
                     self._backend.set_trial_state_values(trial._trial_id, TrialState.FAIL)
                 else:
                     self._backend.set_trial_state_values(trial._trial_id, TrialState.COMPLETE, [number])
+                if actual is not None:
+                    self._space.warn_if_astray(actual, 2)  # beyond `RobotStudy.tell`
                 return Told(id, state, number, False, executions)
             except UpdateFinishedTrialError:  # somebody else was quicker
                 trial = self.trial(id)

@@ -218,6 +218,7 @@ class RobotStudy(OpenedStudy):
         marks: dict[str, Any] = {NOTE: note}
         if reached is not None:
             marks[REACHED] = self.settings.space.check_reached(commanded, reached)
+            self.settings.space.warn_if_astray(marks[REACHED], 1)
         outputs = self._checked(constraints, failed)
         if outputs:
             marks[OUTPUTS] = outputs

@@ -5,6 +5,7 @@ Parameters that can take one value only are left out of the box; what the others
 """
 
 import json
+import warnings
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from typing import Any, Final
@@ -22,6 +23,7 @@ from optuna.distributions import (
 
 from surehold.errors import InputError, unknown_name
 from surehold.optimization.box import Box
+from surehold.optimization.trial_inputs import astray_in_words
 from surehold.optimization.variables import Choice, Number, Variable
 
 __all__ = ["SearchSpace"]
@@ -133,6 +135,17 @@ class SearchSpace:
                 raise unknown_name("parameter", name, self.distributions)
             found[name] = self._variables[name].anywhere(value, "reached")
         return found
+
+    def warn_if_astray(self, reached: Mapping[str, Any], stacklevel: int) -> None:
+        """Warn where what a trial reached, as `check_reached` returns it, lies far outside of the ranges.
+
+        `stacklevel` is how far above the caller of this function the user's line is, which calls a method of a study.
+        """
+        if self.box is None:
+            return
+        U = self.box.to_unit(self.encode_all([reached], anywhere=True))
+        if astray := astray_in_words(self.box, U):
+            warnings.warn(astray, stacklevel=2 + stacklevel)
 
     def encodes(self, parameters: Mapping[str, Any]) -> bool:
         """Tell whether stored parameters name all of this space and have coordinates, inside the box or not."""
