@@ -24,6 +24,18 @@ def test_answers_and_traces(gm_result, gm_report):
     np.testing.assert_allclose(gm_report.noise, 0.01 * np.eye(2))
 
 
+def test_where_nothing_succeeded_no_recommended_input_is_near_the_border():
+    result = sh.maximize(lambda x: x[0], sh.Box({"x": (0.0, 1.0)}), 6, input_noise=sh.InputNoise.unit(0.2), seed=0)
+    shown = [gather.candidate(result, "recommended", result.best_index, None)]
+
+    def notes(least):
+        report = gather.report_of(result, shown, title="", settings={}, noise=None, success_above=least, surfaces=())
+        return " ".join(report.notes)
+
+    assert "The recommended input is near the border" in notes(None)
+    assert not notes(2.0)
+
+
 def averaged(optimizer, x, deviations):
     """Return the model's mean averaged over normal noise at x (d,), by Gauss and Hermite's product rule of NumPy."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(40)

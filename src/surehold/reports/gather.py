@@ -188,7 +188,7 @@ def report_of(
     called = [trial.index for trial in result.trials] if len(result.trials) == y.size else list(range(y.size))
     ids = () if called == list(range(y.size)) else tuple(called)
     missing = ["Trials have the ids of the study; those that are missing have told nothing."] if ids else []
-    return RunReport(
+    report = RunReport(
         title=title,
         variables=variables,
         X=optimizer.reached[:, shown],
@@ -221,13 +221,7 @@ def report_of(
             *notes,
             *missing,
             *_of_constraints(result),
-            *filter(
-                None,
-                (
-                    outside_in_words(result.recommendation.outside),
-                    outliers_in_words([called[i] for i in result.recommendation.outliers]),
-                ),
-            ),
+            *filter(None, [outliers_in_words([called[i] for i in result.recommendation.outliers])]),
         ),
         choices=choices or {},
         parameters=tuple(box.as_given(x) for x in optimizer.reached),
@@ -238,6 +232,8 @@ def report_of(
         counted=counted,
         ids=ids,
     )
+    border = outside_in_words(result.recommendation.outside)
+    return replace(report, notes=(*report.notes, border)) if border and report.succeeded else report
 
 
 def kept_in_box(scores: Mapping[tuple[str, int], RobustScore | None], result: Result) -> list[str]:
