@@ -110,6 +110,8 @@ def test_not_callable():
         ("a=1:1", "smaller"),
         ("a=0:inf", "finite"),
         ("=0:1", "form name=lower:upper"),
+        ("a=0:1;b=0:1", r"'a=0:1;b=0:1' are not of the form name=lower:upper; .*dy=0:1\.$"),
+        ("a=0:1 b=0:1", "form name=lower:upper"),
     ],
 )
 def test_bad_bounds(text, message):

@@ -28,13 +28,12 @@ def checked_problem(label: str, on: ProblemSetup) -> None:
         For an unknown function or argument, with the nearest valid name.
     """
     from surehold.problems.grasp.options import OPTIONS
-    from surehold.problems.named import NAMES, has_own_noise
+    from surehold.problems.named import NAMES, has_own_noise, unknown_function
 
     own = ":" in on.function
     valid = ("bounds",) if own else OPTIONS if on.function == "grasp" else ()
     if not own and on.function != "grasp" and on.function not in NAMES:
-        known = [*NAMES, "grasp", "package.module:function", "path/file.py:function"]
-        raise unknown_name(f"function of problem '{label}'", on.function, known)
+        raise unknown_function(f"function of problem '{label}'", on.function, ("grasp",))
     for name in on.arguments:
         if not valid:
             raise InputError(f"problem '{label}' gives {name!r}, but '{on.function}' takes no arguments; leave it out.")

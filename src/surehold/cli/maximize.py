@@ -191,13 +191,13 @@ def problem_of(text: str, bounds: str) -> Any:
     InputError
         If the name or the reference is wrong, bounds are missing, or bounds are given for a synthetic function.
     """
-    from surehold.errors import InputError, unknown_name
+    from surehold.errors import InputError
     from surehold.problems.function import Function, load_function, parse_bounds
-    from surehold.problems.named import NAMES, named_function
+    from surehold.problems.named import NAMES, named_function, unknown_function
 
     if ":" not in text:
         if text not in NAMES:
-            raise unknown_name("problem", text, [*NAMES, "package.module:function", "path/file.py:function"])
+            raise unknown_function("problem", text)
         if bounds:
             raise InputError(f"problem '{text}' has its own bounds; leave --bounds out.")
         return named_function(text)

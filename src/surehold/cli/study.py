@@ -263,15 +263,15 @@ def export(
 
 def _space_of(parameters: str, problem: str) -> tuple[Any, dict[str, Any]]:
     """Return the search space, and the description of what workers try."""
-    from surehold.errors import InputError, unknown_name
+    from surehold.errors import InputError
     from surehold.problems import load_function
-    from surehold.problems.named import NAMES, named_function
+    from surehold.problems.named import NAMES, named_function, unknown_function
     from surehold.studies.parameter_text import parse_search_space
     from surehold.studies.search_space import SearchSpace
 
     if problem and ":" not in problem:
         if problem not in NAMES:
-            raise unknown_name("problem", problem, [*NAMES, "package.module:function", "path/file.py:function"])
+            raise unknown_function("problem", problem)
         if parameters:
             raise InputError(f"problem '{problem}' has its own parameters; leave --parameters out.")
         return SearchSpace(named_function(problem).box), {"synthetic": problem}

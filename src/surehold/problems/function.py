@@ -128,7 +128,7 @@ def parse_bounds(text: str) -> Box:
     """
     bounds: dict[str, tuple[float, float]] = {}
     for i, part in enumerate(text.split(",")):
-        name, equals, span = part.rpartition("=")
+        name, equals, span = part.partition("=") if "=" in part else ("", "", part)
         name = name.strip() if equals else f"x{i + 1}"
         lower, colon, upper = span.partition(":")
         try:
@@ -139,7 +139,7 @@ def parse_bounds(text: str) -> Box:
             kinds = " For logarithmic, whole-number and choice variables use surehold study create --parameters."
             raise InputError(
                 f"bounds {part.strip()!r} are not of the form name=lower:upper; write for example "
-                f"--bounds dx=-0.05:0.05,dy=0:1.{kinds * ('|' in span or span.count(':') > 1)}"
+                f"--bounds dx=-0.05:0.05,dy=0:1.{kinds * ('=' not in span and ('|' in span or span.count(':') > 1))}"
             ) from None
         if name in bounds:
             raise InputError(f"bounds name {name!r} twice; give each variable once.")

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from typing import Any, Final
 
-from surehold.errors import unknown_name
+from surehold.errors import InputError, unknown_name
 from surehold.problems.high_dimensional import HIGH_DIMENSIONAL, HIGH_DIMENSIONAL_ROBUST
 from surehold.problems.published import PUBLISHED
 from surehold.problems.robust import ROBUST, RobustProblem
 from surehold.problems.synthetic import SYNTHETIC
 
-__all__ = ["NAMES", "has_own_noise", "named_function", "robust_problem"]
+__all__ = ["NAMES", "has_own_noise", "named_function", "robust_problem", "unknown_function"]
 
 _ROBUST: Final[dict[str, Callable[[], RobustProblem]]] = {
     **ROBUST,
@@ -37,6 +37,15 @@ def robust_problem(name: str) -> RobustProblem:
     if name not in _ROBUST:
         raise unknown_name("robust problem", name, _ROBUST)
     return _ROBUST[name]()
+
+
+def unknown_function(kind: str, text: str, more: tuple[str, ...] = ()) -> InputError:
+    """Return the error for a text that is no name of a problem, nor the reference of a function with its colon."""
+    if text.endswith(".py"):
+        return InputError(
+            f"{kind} {text!r} is a file; say which of its functions, behind a colon, for example '{text}:quality'."
+        )
+    return unknown_name(kind, text, [*NAMES, *more, "package.module:function", "path/file.py:function"])
 
 
 def has_own_noise(name: str) -> bool:
