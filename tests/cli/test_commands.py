@@ -99,13 +99,15 @@ def here(tmp_path, monkeypatch):
         ("maximize own.py:hill", "--bounds are missing"),
         ("maximize own.py:hill --bounds a=1:0", "smaller"),
         ("maximize own.py:hill --bounds a=0:inf", "finite"),
+        ("maximize own.py --bounds a=0:1", "say which of its functions, behind a colon, for example 'own.py:quality'"),
+        ("study create rig --problem own.py", "problem 'own.py' is a file"),
         ("maximize own.py:hil --bounds a=0:1", "did you mean 'hill'"),
         ("maximize gone.py:hill --bounds a=0:1", "does not exist"),
         ("maximize rkhs --colour red", "--colour"),
         ("maximize rkhs --study=", "option --study is given an empty text; give a value, or leave the option out"),
         ("maximize rkhs --feasible 0", "feasible is 0.0; give a probability"),
         ("maximize", "Missing argument 'problem'"),
-        ("maximise rkhs", "maximise"),
+        ("maximise rkhs", "'maximise'. Did you mean 'maximize', 'minimize'? See surehold --help."),
         ("grasp mugg", "did you mean 'mug'"),
         ("grasp mug --facet rihgt-front", "did you mean 'right"),
         ("grasp mug --facet right-left", "right-front"),
@@ -397,6 +399,16 @@ def test_the_module_is_the_command(here):
     assert done.returncode == 2
     assert done.stderr.startswith("error: problem 'nothing' is unknown")
     assert done.stdout == ""
+
+
+def test_a_warning_is_one_line_without_the_place_in_the_program(here):
+    (here / "loud.py").write_text("import warnings\n\ndef hill(x):\n    warnings.warn('hot')\n    return x[0]\n")
+    line = "maximize loud.py:hill --bounds a=0:1 --noise a=3 --trials 1 --requeries 0"
+    done = subprocess.run(
+        [sys.executable, "-m", "surehold", *line.split()], capture_output=True, text=True, check=True
+    ).stderr.splitlines()
+    assert done[0].startswith("warning: input noise of a has a standard deviation of 3, 3.0 times the box: ")
+    assert done[1].endswith("loud.py:4: UserWarning: hot"), "of a function of theirs users are told where"
 
 
 def test_a_closed_pipe_does_not_end_the_run(here):

@@ -1,18 +1,25 @@
 """The command line: commands, progress and tables; no logic of its own."""
 
 import sys
+import warnings
 from collections.abc import Sequence
 from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
 
 __all__ = ["completed", "main"]
+
+_PACKAGE: Final = Path(__file__).parents[1]
+_of_python: Final = warnings.showwarning
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit.
 
     0: done; 1: nothing came of it; 2: bad input; 3: nothing found that succeeds; 130: interrupted with nothing to keep.
-    Every expected error is one line on the standard error stream.
+    Every expected error is one line on the standard error stream, and so is every warning of surehold.
     """
+    warnings.showwarning = _warn
     sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))
 
 
@@ -56,7 +63,7 @@ def _run(arguments: list[str]) -> int:
             typer.echo(message)
             return 0
         command = getattr(getattr(error, "ctx", None), "command_path", "surehold")
-        _say(f"{message.rstrip('.')}. See {command} --help.")
+        _say(f"{message.rstrip('.')}{'' if message.endswith('?') else '.'} See {command} --help.")
         return int(getattr(error, "exit_code", 2))
     except typer.Abort:
         return _interrupted()
@@ -99,6 +106,14 @@ def completed(arguments: list[str]) -> list[str]:
 def _interrupted() -> int:
     _say("interrupted; what was finished before is kept.")
     return 130
+
+
+def _warn(message: Warning | str, category: type[Warning], filename: str, lineno: int, *more: Any) -> None:
+    """Show a warning: of surehold's the text alone, for its place says nothing to a user; of other code also that."""
+    if _PACKAGE in Path(filename).parents and category is UserWarning:
+        print(f"warning: {' '.join(str(message).split())}", file=sys.stderr)  # noqa: T201
+    else:
+        _of_python(message, category, filename, lineno, *more)
 
 
 def _say(message: str) -> None:

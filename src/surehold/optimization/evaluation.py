@@ -65,7 +65,7 @@ def evaluate(f: Callable[[Any], Any], x: NDArray[np.float64] | dict[str, Any]) -
 
 def _number(value: Any) -> tuple[float, str]:
     if value is None:
-        return np.nan, "returned None instead of a number; does it lack a return"
+        return np.nan, "returned None instead of a number (is a return missing?)"
     try:
         array = numbers_of(value)
     except (TypeError, ValueError, OverflowError) as error:
