@@ -140,6 +140,14 @@ def test_differences_below_the_smallest_effect_are_no_verdict():
     assert [t.verdict for t in told(-0.006 * top)] == ["worse", "contradicted"]
 
 
+def test_the_smallest_effect_is_that_of_the_best_method_below_zero_too():
+    """Of values around -10 a gain of 0.2 is 2 %, also beside a method that ends at -100."""
+    base = drawn(-10.0, 0.1, 30)
+    better = [v + 0.2 for v in base]
+    results = {("a", "first"): base, ("a", "second"): better, ("a", "random"): drawn(-100.0, 1.0, 30)}
+    assert [told.verdict for told in comparisons(records_of("mine", 30, results))] == ["better", "worse"]
+
+
 @pytest.mark.parametrize(
     ("shift", "rkhs", "gf"),
     [(0.2, "holds", "contradicted"), (0.0, "not shown", "holds"), (-0.2, "contradicted", "holds")],
@@ -229,6 +237,9 @@ def test_a_campaign_is_priced_by_the_runs_made():
     values = {("RKHS", "GP"): [5.0] * 30, ("RKHS", "TGP-winf"): [5.0] * 15}
     row = total_cost_table({"table-4.1": records_of("table-4.1", 100, values)}).rows[0]
     assert row == ("table-4.1", "45 of 200", "1.50", "6.67")  # 2 s a run
+    former = records_of("table-4.1", 100, values | {("RKHS", "of a former plan"): [5.0] * 60})
+    former.header["cells"].pop()  # its runs are not counted, nor is their time
+    assert total_cost_table({"table-4.1": former}).rows[0] == row
     values["GM", "GP"] = []
     assert total_cost_table({"a": records_of("table-4.1", 100, values)}).rows[0][-1] == "–"
 

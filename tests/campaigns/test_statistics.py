@@ -43,6 +43,27 @@ def test_paired_beside_scipy():
     assert told.r == pytest.approx((up - down) / (up + down))
 
 
+@pytest.mark.parametrize(
+    "difference",
+    [[1.0] * 4, [1.0] * 5, [1.0, 1.0, 1.0, -1.0, 1.0, 0.0], [2.0, -1.0, 1.0, 3.0, 3.0, -2.0], [0.5, 2.0, 1.0]],
+)
+def test_differences_of_the_same_size_are_judged_by_all_their_signs(difference):
+    other = np.array([d for d in difference if d != 0.0])
+
+    def positive(signed):
+        return (stats.rankdata(np.abs(signed)) * (signed > 0.0)).sum()
+
+    every = stats.permutation_test((other,), positive, permutation_type="samples", n_resamples=np.inf)
+    assert paired(difference, np.zeros(len(difference))).p == pytest.approx(every.pvalue)
+
+
+@pytest.mark.parametrize("n", [6, 20, 50, 51])
+def test_p_values_of_few_and_of_many_differences_beside_scipy(n):
+    difference = np.random.default_rng(n).normal(0.3, 1.0, n)
+    expected = stats.wilcoxon(difference, method="exact" if n <= 50 else "asymptotic").pvalue
+    assert paired(difference, np.zeros(n)).p == pytest.approx(expected, rel=1e-9)
+
+
 def test_the_effect_size_has_its_limits_and_sign():
     assert paired(X + 1.0, X).r == 1.0
     assert paired(X - 1.0, X).r == -1.0

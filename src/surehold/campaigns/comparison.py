@@ -216,7 +216,7 @@ def least_of(records: Records, problem: str) -> float:
     for measure in ("best", *measures_of(records)):
         values = [list(final_values(records, problem, cell["method"], measure).values()) for cell in cells]
         if any(values):
-            return SMALLEST_EFFECT * max(abs(float(np.mean(v))) for v in values if v)
+            return SMALLEST_EFFECT * abs(max(float(np.mean(v)) for v in values if v))
     return 0.0
 
 

@@ -50,16 +50,17 @@ def total_cost_table(campaigns: Mapping[str, Records]) -> Table:
     """Return what each campaign has cost, and what all its runs cost by the mean of those made."""
     body = []
     for plan, records in campaigns.items():
+        cells = [(cell["problem"], cell["method"]) for cell in records.header["cells"]]
         seconds: dict[tuple[str, str], list[float]] = {}
         for (problem, method, _), row in records.done.items():
-            seconds.setdefault((problem, method), []).append(row["cpu_seconds"])
-        cells = [(cell["problem"], cell["method"]) for cell in records.header["cells"]]
+            if (problem, method) in cells:
+                seconds.setdefault((problem, method), []).append(row["cpu_seconds"])
         planned = records.runs
         known = [sum(seconds[cell]) / len(seconds[cell]) for cell in cells if cell in seconds]
         body.append(
             (
                 plan,
-                f"{sum(len(seconds[cell]) for cell in cells if cell in seconds)} of {planned * len(cells)}",
+                f"{sum(map(len, seconds.values()))} of {planned * len(cells)}",
                 number(sum(map(sum, seconds.values())) / 60.0, 3),
                 number(sum(known) * planned / 60.0, 3) if len(known) == len(cells) else "–",
             )
