@@ -177,6 +177,9 @@ def main():
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", default="", help="file for the rows, as CSV")
     arguments = parser.parse_args()
+    for method in arguments.methods:
+        if TOLD.get(method, method) not in (*OURS, *installed_peers()):
+            parser.error(f"{method} is not installed; pip install '.[peers]', or leave it out of --methods")
     family = SETS[arguments.set][1]
     if arguments.set == "kinds":
         seeds = list(family[arguments.first : arguments.first + arguments.count])

@@ -3,7 +3,7 @@
 The robust value of an answer is g(x) = E f(x + noise), known in closed form (a coordinate that would leave the box
 keeps its noise-free value); the robust regret is what it lacks to the best one. Every method gets the same initial
 design, seed by seed; its answer is looked at after every fifth trial. Printed are mean and standard error of the final
-regret, in per cent of the best value, its paired difference from the default, the number of trials from which the
+regret, in per cent of the best value, its paired difference from the first method, the number of trials from which the
 regret stays below 1 % (median and 90th percentile; "-" where that share of the runs never does), how often one run
 proposed one point, the share of trials in the corners (5 % of every side), and CPU seconds a run.
 """
@@ -133,7 +133,7 @@ def main():
     arguments = parser.parse_args()
     print(f"{arguments.seeds} seeds; regret in % of the best robust value")
     print(
-        f"{'problem':15} {'method':22} {'regret':>17} {'minus default':>19} {'to 1 %':>7} {'90 %':>5} {'same':>5} "
+        f"{'problem':15} {'method':22} {'regret':>17} {'minus the first':>19} {'to 1 %':>7} {'90 %':>5} {'same':>5} "
         "corners CPU s"
     )
     for name in arguments.problems:

@@ -3,12 +3,12 @@
     python -m benchmarks.smooth_regret --functions branin ackley-4 --methods default tgp optuna-gp
 
 Branin and six-hump camel in 40 trials; Hartmann-6, Levy-4, Rosenbrock-4, Styblinski-Tang-5 and Ackley-4 in 80; 5 d
-initial ones, the same for every method, seed by seed. No noise anywhere; peers are those that are installed. Printed
-are mean and standard error of log10 of the regret (known maximum minus best observed, at least 1e-9) at half and full
-budget, and the paired difference at full budget from the first method. Ackley is on [-14, 26]^4: in its usual box the
-optimum is the center, where some methods begin. The functions named -wide are on larger boxes. The method as-told is
-the default without what `optimization.low_tail` does to deep values. `--rows FILE` keeps the runs, a line each, and
-those that it holds are not made again.
+initial ones, the same for every method, seed by seed. No noise anywhere; peers are those that are installed, and those
+whose runs are in the file of `--rows`. Printed are mean and standard error of log10 of the regret (known maximum minus
+best observed, at least 1e-9) at half and full budget, and the paired difference at full budget from the first method.
+Ackley is on [-14, 26]^4: in its usual box the optimum is the center, where some methods begin. The functions named
+-wide are on larger boxes. The method as-told is the default without what `optimization.low_tail` does to deep values.
+`--rows FILE` keeps the runs, a line each, and those that it holds are not made again.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.kept_runs import keep, kept
 from surehold.campaigns.methods import Surehold
-from surehold.campaigns.peers import installed_peers
+from surehold.campaigns.peers import PEERS, installed_peers
 from surehold.optimization.surrogates.named import DEFAULT_SURROGATE, surrogate_named
 from surehold.problems.published import branin
 
@@ -146,12 +146,15 @@ def main():
     parser.add_argument(
         "--functions", nargs="+", default=[name for name in FUNCTIONS if "wide" not in name], choices=list(FUNCTIONS)
     )
-    methods = [*OURS, *installed_peers()]
-    parser.add_argument("--methods", nargs="+", default=methods, choices=methods)
+    parser.add_argument("--methods", nargs="+", default=[*OURS, *installed_peers()], choices=[*OURS, *PEERS])
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--rows", type=Path, help="file of the runs, a line each")
     arguments = parser.parse_args()
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+    made = kept(arguments.rows)
+    for method in sorted(set(arguments.methods) - {*OURS, *installed_peers()}):
+        if any((name, method, seed) not in made for name in arguments.functions for seed in seeds):
+            parser.error(f"{method} is not installed, and some of its runs have to be made; pip install '.[peers]'")
     print(f"{arguments.seeds} seeds; log10 of the regret")
     print(f"{'function':18} {'method':22} {'half':>15} {'full':>15} {'- first':>15} {'CPU s':>6}")
     for name in arguments.functions:

@@ -150,10 +150,13 @@ def cells(table):
 
 
 def calibration_of(rows):
-    """Print predicted and happened shares of the trials after the initial design, by tenths of the prediction."""
+    """Print predicted and happened shares of the trials after the initial design, by tenths of the prediction.
+
+    Rows that are kept in the repository have what was found only.
+    """
     pairs = {}
     for row in rows:
-        pairs.setdefault(row["method"], []).extend(row["asked"])
+        pairs.setdefault(row["method"], []).extend(row.get("asked", []))
     for method, told in pairs.items():
         predicted, happened = np.array(told, dtype=float).reshape(-1, 2).T
         for k in range(10):

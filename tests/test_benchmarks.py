@@ -1,10 +1,19 @@
-"""The stored table of benchmarks: what is written is read again, and a loss is marked. Nothing is timed here."""
+"""The stored table of benchmarks: what is written is read again, and a loss is marked. Nothing is timed here.
+
+Rows of runs that stand in the repository are printed by their benchmark without a run, as the pages have them.
+"""
+
+import shutil
+import sys
+from pathlib import Path
 
 import pytest
 
-from benchmarks import stored
+from benchmarks import smooth_regret, stored, success_outcomes
 from benchmarks.regret_causes import cause
 from benchmarks.stored import Row
+
+RESULTS = Path(__file__).parents[1] / "results" / "benchmarks"
 
 
 def test_a_stored_table_is_compared_in_yardsticks(tmp_path):
@@ -36,3 +45,34 @@ def test_a_stored_table_is_compared_in_yardsticks(tmp_path):
 )
 def test_the_first_cause_that_is_true_is_that_of_a_regret(full, tried, climb, z, expected):
     assert cause({"full": full, "tried": tried, "climb": climb, "z": z}) == expected
+
+
+def printed(benchmark, folder, options, tmp_path, monkeypatch, capsys):
+    """Return the lines that a benchmark prints of a copy of the rows in a folder, which it must not add to."""
+    rows = shutil.copy(RESULTS / folder / "rows.jsonl", tmp_path)
+    monkeypatch.setattr(sys, "argv", ["benchmark", "--rows", str(rows), *options.split()])
+    benchmark.main()
+    assert Path(rows).read_bytes() == (RESULTS / folder / "rows.jsonl").read_bytes()
+    return capsys.readouterr().out.splitlines()
+
+
+def test_kept_runs_of_successes_are_printed_as_published(tmp_path, monkeypatch, capsys):
+    options = "--seeds 100 --trials 80 --no-time"
+    lines = printed(success_outcomes, "success-outcomes", options, tmp_path, monkeypatch, capsys)
+    assert len(lines) == 15
+    assert set(lines) <= set((RESULTS / "success-outcomes" / "README.md").read_text(encoding="utf-8").splitlines())
+
+
+def test_kept_runs_of_other_libraries_are_printed_without_them(tmp_path, monkeypatch, capsys):
+    options = "--first-seed 50 --functions branin --methods default optuna-gp botorch --processes 1"
+    lines = printed(smooth_regret, "smooth-functions", options, tmp_path, monkeypatch, capsys)
+    page = (RESULTS.parents[1] / "docs" / "results" / "smooth-functions.md").read_text(encoding="utf-8")
+    half, full = (line for line in page.splitlines() if line.startswith("| Branin"))
+    for line in lines[2:]:
+        cells = line.split(maxsplit=2)[2]
+        for row, part in ((half, cells[:15]), (full, cells[15:30])):
+            assert " ".join(part.split()).replace("( ", "(") in row
+    monkeypatch.setattr(smooth_regret, "installed_peers", dict)
+    with pytest.raises(SystemExit):
+        printed(smooth_regret, "smooth-functions", options.replace("50", "49"), tmp_path, monkeypatch, capsys)
+    assert "botorch is not installed, and some of its runs have to be made; pip install" in capsys.readouterr().err
