@@ -51,6 +51,8 @@ def test_an_interval_that_is_turned_over_is_unlikely_but_finite():
     value, by_a, by_b = log_interval(np.array([2.0]), np.array([1.0]))
     assert np.isfinite([value[0], by_a[0], by_b[0]]).all()
     assert value[0] == pytest.approx(norm.logpdf(1.5) + np.log(1e-6), abs=1e-3)
+    slopes = approx_fprime(np.array([2.0, 1.0]), lambda ends: log_interval(*ends[:, None])[0][0], 1e-6)
+    np.testing.assert_allclose([by_a[0], by_b[0]], slopes, rtol=1e-3)
 
 
 def test_interval_keeps_its_digits_in_the_upper_tail():
@@ -68,15 +70,18 @@ def test_probability_without_noise_is_that_of_the_mixture_of_normals(posterior, 
     assert execution_probability([(posterior, limit)], Perturbations(exact(2)), U) == pytest.approx(expected, abs=1e-10)
 
 
-@pytest.mark.parametrize("noisy", [False, True])
+@pytest.mark.parametrize(("deviation", "border"), [(0.0, "extend"), (0.05, "extend"), (0.2, "clip")])
 @pytest.mark.parametrize("limit", [Limit("c", -np.inf, 1.5), Limit("c", 0.8, 2.2)])
-def test_gradients_by_differences(posterior, limit, noisy):
-    box = Box.unit(2)
-    perturbations = Perturbations.of(InputNoise.unit(0.05), box, "unscented") if noisy else Perturbations(exact(2))
+def test_gradients_by_differences(posterior, limit, deviation, border):
+    noise = InputNoise.unit(deviation) if deviation else None
+    perturbations = Perturbations.of(noise, Box.unit(2), "unscented", border)
     within = Within(posterior, limit, perturbations, 1.645)
     for u in RNG.random((6, 2)):
         error = check_grad(
-            lambda v: within.log_probability(v[None])[0][0], lambda v: within.log_probability(v[None], True)[1][0], u
+            lambda v: within.log_probability(v[None])[0][0],
+            lambda v: within.log_probability(v[None], True)[1][0],
+            u,
+            epsilon=1e-6,
         )
         scale = 1.0 + np.abs(within.log_probability(u[None], True)[1]).max()
         assert error < 1e-4 * scale

@@ -141,4 +141,5 @@ def log_interval(
     with np.errstate(over="ignore"):
         by_a = -np.exp(np.minimum(-0.5 * a * a - _LOG_SQRT_2PI - value, 700.0))
         by_b = np.exp(np.minimum(-0.5 * b * b - _LOG_SQRT_2PI - value, 700.0))
-    return value, by_a, by_b
+    by_either = -0.5 * middle  # of a width that stays as it is
+    return value, np.where(narrow, by_either, by_a), np.where(narrow, by_either, by_b)
