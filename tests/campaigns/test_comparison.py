@@ -64,6 +64,8 @@ def test_final_values_and_traces():
     assert traces(records, "a", "m", "best").tolist() == [[v - 1, v - 1, v, v] for v in (1.0, 2.0, 3.0)]
     records.rows["a", "m", 1]["status"] = "failed"
     assert final_values(records, "a", "m", "best") == {0: 1.0, 2: 3.0}
+    records.rows = dict(reversed(records.rows.items()))  # runs end in any order
+    assert list(final_values(records, "a", "m", "best")) == [0, 2]
 
 
 @pytest.mark.parametrize(
@@ -86,6 +88,10 @@ def test_a_low_standard_deviation_is_better():
     assert row.verdict == "better"  # 0.3 against the published 0.554
     higher = records_of("table-4.4", 100, {("RKHS", "BO"): drawn(0.9, 0.1, 100)}, "std")
     assert next(row for row in rows_of(higher) if row.measure == "std").verdict == "differs"
+    results = {("a", "first"): drawn(0.9, 0.1, 30), ("a", "second"): values[:30]}
+    records = records_of("mine", 30, results, "std", mean=[[0, 4.0]], worst=[[0, 1.0]])
+    records.header["cells"][0]["input_noise"] = 0.1
+    assert next(told for told in comparisons(records) if told.measure == "std").verdict == "better"
 
 
 def test_rows_without_runs_say_so():
@@ -118,6 +124,7 @@ def test_methods_are_compared_on_common_seeds():
     assert told.verdict == "worse"
     (told,) = comparisons(records_of("mine", 30, {("a", "first"): base, ("a", "second"): drawn(1.0, 0.3, 30, 9)}))
     assert told.verdict == "no difference shown"
+    assert comparisons(records_of("mine", 30, {("a", "first"): base, ("a", "second"): better[:1]})) == []
 
 
 def test_differences_below_the_smallest_effect_are_no_verdict():
@@ -168,7 +175,7 @@ def test_claims(shift, rkhs, gf):
 
 def test_claims_that_are_not_shown_come_with_what_is_seen():
     top = RKHS().optimum.value
-    results = {("RKHS", "GP"): [top] * 30 + [5.0], ("RKHS", "TGP-winf"): [top] * 31}
+    results = {("RKHS", "GP"): [top] * 29 + [0.991 * top, 0.989 * top], ("RKHS", "TGP-winf"): [top] * 31}
     told = claim_results({"table-4.1": records_of("table-4.1", 100, results)})
     (first,) = [t for t in told if t.claim.better == "TGP-winf" and t.claim.problem == "RKHS" and t.result]
     assert first.verdict == "not shown"
@@ -264,4 +271,9 @@ def test_a_method_that_mostly_gains_and_loses_more_by_the_mean_is_not_called_bet
     assert stats.wilcoxon(gains).pvalue < 0.05
     assert told.p < 0.05
     assert told.difference.mean < 0.0 < told.difference.r
+    assert told.verdict == "no difference shown"
+    gains = np.append(np.arange(1.0, 30.0), -435.0)  # of no gain by the mean at all
+    records = records_of("mine", 30, {("a", "first"): [0.0] * 30, ("a", "second"): gains.tolist()})
+    (told,) = comparisons(records)
+    assert told.p < 0.05
     assert told.verdict == "no difference shown"

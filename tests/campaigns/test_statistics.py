@@ -57,9 +57,10 @@ def test_differences_of_the_same_size_are_judged_by_all_their_signs(difference):
     assert paired(difference, np.zeros(len(difference))).p == pytest.approx(every.pvalue)
 
 
-@pytest.mark.parametrize("n", [6, 20, 50, 51])
-def test_p_values_of_few_and_of_many_differences_beside_scipy(n):
-    difference = np.random.default_rng(n).normal(0.3, 1.0, n)
+@pytest.mark.parametrize(("n", "digits"), [(6, 9), (20, 9), (50, 9), (51, 9), (60, 1)])
+def test_p_values_of_few_and_of_many_differences_beside_scipy(n, digits):
+    difference = np.random.default_rng(n).normal(0.3, 1.0, n).round(digits)
+    difference[difference == 0.0] = 0.1
     expected = stats.wilcoxon(difference, method="exact" if n <= 50 else "asymptotic").pvalue
     assert paired(difference, np.zeros(n)).p == pytest.approx(expected, rel=1e-9)
 
@@ -96,6 +97,7 @@ def test_p_against_a_published_mean_is_welchs():
     assert p_against(X, float(other.mean()), std, 100) == pytest.approx(expected)
     assert p_against(X, float(X.mean()), None, 100) == pytest.approx(1.0)
     assert np.isnan(p_against([1.0], 2.0, None, 100))
+    assert np.isnan(p_against(X, 2.0, 1.5, 1)), "one published run has no spread"
     assert p_against([1.0, 1.0], 1.0, 0.0, 100) == 1.0
     assert p_against([1.0, 1.0], 2.0, None, 100) == 0.0
 

@@ -139,6 +139,9 @@ def test_tangents_are_unit_perpendicular_and_continuous():
     near /= np.linalg.norm(near, axis=1)[:, None]
     assert np.abs(tangents(near) - tangents(away)).max() < 1e-4
     np.testing.assert_allclose(np.linalg.norm(tangents([[-0.36, -0.48, -0.8]])), 1.0)
+    beside = [-0.36, -0.48, -0.8] + 1e-7 * rng.normal(size=(100, 3))  # the pole's other side, where digits are lost
+    beside /= np.linalg.norm(beside, axis=1)[:, None]
+    np.testing.assert_allclose(np.sum(tangents(beside) * beside, axis=1), 0.0, atol=1e-14)
 
 
 def test_outside_is_minus_the_distance_to_the_hull():
@@ -261,7 +264,8 @@ def test_round_cones_lie_between_inscribed_and_circumscribed_polyhedra():
 def test_round_support_is_the_supremum_over_the_cone():
     rng = np.random.default_rng(10)
     points, normals = random_contacts(rng, 3)
-    contacts = CheckedContacts.checked(points, normals, 0.6, torsion=0.2, torque_length=0.5)
+    weights = np.array([1.0, 0.3, 0.6])
+    contacts = CheckedContacts.checked(points, normals, 0.6, torsion=0.2, torque_length=0.5, weights=weights)
     centers, axes = round_contacts(contacts)
     u = rng.normal(size=6)
     z = rng.normal(size=(200_000, 3))
@@ -271,7 +275,7 @@ def test_round_support_is_the_supremum_over_the_cone():
             z[:, :1] * contacts.tangents[i] + z[:, 1:2] * np.cross(normals[i], contacts.tangents[i])
         )
         moment = (np.cross(points[i], force) + 0.2 * z[:, 2:] * normals[i]) / 0.5
-        sampled = (np.hstack((force, moment)) @ u).max()
+        sampled = weights[i] * (np.hstack((force, moment)) @ u).max()
         exact = centers[i] @ u + np.linalg.norm(u @ axes[i])
         assert sampled <= exact + 1e-12
         assert sampled == pytest.approx(exact, rel=1e-4)

@@ -71,6 +71,7 @@ def test_upper_confidence_bound():
 def test_no_spread():
     assert expected_improvement([1.0, -1.0, 0.0], 0.0, 0.0).value.tolist() == [1.0, 0.0, 0.0]
     assert probability_of_improvement([1.0, -1.0], 0.0, 0.0).value.tolist() == [1.0, 0.0]
+    assert np.isfinite(probability_of_improvement([1e300, -1e300], 0.0, 0.0)).all(), "z squared overflows, or z itself"
 
 
 @pytest.mark.parametrize("std", [1e-7, 1e-9, 1e-20, 0.0])

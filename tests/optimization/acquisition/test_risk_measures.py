@@ -169,6 +169,14 @@ def test_order_and_symmetries(draws, alpha, seed):
         assert risk_of(name, alpha).measure(draws[order], weights[order]) == pytest.approx(value, abs=1e-6), name
 
 
+def test_spread_is_that_of_draws_met_as_often_as_they_weigh():
+    draws, often = np.array([3.0, -1.0, 0.5]), np.array([1, 5, 2])
+    all_of_them = np.repeat(draws, often)
+    found = {name: Risk(name, beta=2.0).measure(draws, often / 8.0) for name in ("mean-std", "mean-variance")}
+    assert found["mean-std"] == pytest.approx(all_of_them.mean() - 2.0 * all_of_them.std())
+    assert found["mean-variance"] == pytest.approx(all_of_them.mean() - 2.0 * all_of_them.var())
+
+
 def test_limits_of_the_share_that_counts():
     draws, weights = RNG.normal(size=20), np.full(20, 0.05)
     assert Risk("cvar", 1.0 - 1e-12).measure(draws, weights) == pytest.approx(draws.mean())
@@ -360,6 +368,23 @@ def test_the_correction_of_an_unsure_model_against_joint_draws_at_all_points(uns
     corrected = [RiskImprovement(unsure, few, risk, None, rng(k)).corrected(many).expectation(U) for k in range(40)]
     left, off = (np.abs(values - drawn).mean() for values in (np.mean(corrected, axis=0), alone))
     assert left < 0.95 * off
+
+
+def test_where_no_draw_improves_the_nearest_one_tells_how_much_is_lacking(unsure):
+    U = np.random.default_rng(4).random((5, 2))
+    improvement = RiskImprovement(
+        unsure, Perturbations(sigma_points(S)), Risk("mean-std"), 50.0, np.random.default_rng(0)
+    )
+    np.testing.assert_allclose(improvement(U), improvement.values(U).max(axis=0) - 50.0)
+
+
+def test_a_variance_beyond_all_numbers_is_not_corrected(unsure):
+    X = np.random.default_rng(2).random((8, 2))
+    huge = GaussianProcess(length_scales=[0.4, 0.3], signal_variance=1.0).fit(X, 1e200 * X[:, 0]).posterior
+    few, many = (Perturbations(quasi_monte_carlo(S, exponent)) for exponent in (3, 8))
+    improvement = RiskImprovement(huge, few, Risk("mean-variance"), None, np.random.default_rng(0))
+    with np.errstate(over="ignore"):
+        assert not np.isnan(improvement.corrected(many).expectation(X)).any()
 
 
 def test_worst_case_bound(known, unsure):

@@ -71,6 +71,9 @@ def test_uniform_noise_stays_within_its_half_widths():
     np.testing.assert_allclose(draws.std(axis=0), [0.03 / 3**0.5, 0.1 / 3**0.5], rtol=0.02)
     assert noise.bounded
     assert repr(noise) == "InputNoise.uniform({'dx': 0.003, 'dy': 0.006})"
+    points, weights = noise.kind.quadrature(HAND, "quasi_monte_carlo", 1.0, 6)[0]
+    assert np.all(np.abs(points) <= [0.03, 0.1])
+    np.testing.assert_allclose(weights @ points**4, np.array([0.03, 0.1]) ** 4 / 5.0, rtol=0.01)
 
 
 def test_varying_noise_is_asked_where_it_acts():
@@ -92,6 +95,19 @@ def test_varying_noise_may_return_deviations_or_a_covariance():
     np.testing.assert_allclose(
         InputNoise.varying(lambda x: S).unit_covariance(HAND), InputNoise(covariance=S).unit_covariance(HAND)
     )
+    draws = InputNoise.varying(lambda x: S).draws(HAND, np.full(2, 0.5), 20_000, np.random.default_rng(0))
+    expected = InputNoise(covariance=S).unit_covariance(HAND)
+    np.testing.assert_allclose(np.cov(draws.T), expected, atol=0.02 * np.diag(expected).max())
+
+
+def test_outside_of_the_box_varying_noise_is_that_of_the_nearest_border():
+    def inside_alone(x):
+        assert HAND.contains(x), x
+        return [0.001 + 0.1 * abs(x[0]), 0.003]
+
+    noise = InputNoise.varying(inside_alone)
+    draws = noise.draws(HAND, np.array([1.5, 0.5]), 5000, np.random.default_rng(0))
+    np.testing.assert_allclose(draws.std(axis=0), [0.06, 0.05], rtol=0.05)
 
 
 @pytest.mark.parametrize(
@@ -127,6 +143,14 @@ def test_a_covariance_of_any_units_and_with_exact_variables(S):
         x = optimizer.ask()
         optimizer.tell(x, -float(np.square(MIXED.to_unit(x) - 0.4).sum()))
     assert np.isfinite(optimizer.recommend().mean)
+
+
+def test_rounding_between_the_halves_of_a_covariance_is_taken_out():
+    noise = InputNoise(covariance=[[1e-6, 1e-17], [5e-17, 1e-6]])
+    found = noise.unit_covariance(HAND)
+    np.testing.assert_array_equal(found, found.T)
+    points, weights = Perturbations.of(noise, HAND, "unscented").quadrature
+    np.testing.assert_allclose((weights * points.T) @ points, found, rtol=1e-9, atol=1e-20)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ import pytest
 from filterpy.kalman import JulierSigmaPoints, MerweScaledSigmaPoints
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import chi2, norm
+from scipy.stats import chi2, norm, qmc
 
 from surehold.errors import InputError
 from surehold.optimization.noise.quadratures import (
@@ -158,3 +158,18 @@ def test_quasi_random_points_have_the_covariance_and_no_farther_ones_than_normal
     assert squared.max() < chi2(d).isf(1e-4 if d < 16 else 0.2)
     if d <= 3:  # where so many points can tell
         assert np.quantile(squared, 0.9) == pytest.approx(chi2(d).isf(0.1), rel=0.2)
+
+
+@pytest.mark.parametrize("d", [17, 40])
+def test_quasi_random_points_of_very_many_variables_have_the_variances(d):
+    points, weights = quasi_monte_carlo(np.diag(np.arange(1.0, d + 1.0)), 5)
+    np.testing.assert_allclose(weights @ points, 0.0, atol=1e-12)
+    np.testing.assert_allclose(weights @ points**2, np.arange(1.0, d + 1.0))
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_quasi_random_points_are_spread_more_evenly_than_scrambled_sequences(d):
+    uniform, _ = quasi_monte_carlo(np.eye(d), 6, bounded=True)
+    shares = 0.5 + (0.5 - 0.25 / 32) * uniform / np.abs(uniform).max()  # the outermost are a quarter of a cell inside
+    others = [qmc.discrepancy(qmc.Sobol(d, rng=seed).random_base2(6)) for seed in range(100)]
+    assert qmc.discrepancy(shares) < np.quantile(others, 0.05)
