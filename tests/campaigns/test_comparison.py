@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 from statsmodels.stats.power import TTestPower
 
-from surehold.campaigns.comparison import claim_results, comparisons, final_values, rows_of, traces
+from surehold.campaigns.comparison import claim_results, comparisons, final_values, measures_of, rows_of, traces
 from surehold.campaigns.costs import cost_table, total_cost_table
 from surehold.campaigns.published import ORIGINAL_SECONDS, published, published_tables
 from surehold.campaigns.sections import (
@@ -64,6 +64,10 @@ def test_final_values_and_traces():
     assert traces(records, "a", "m", "best").tolist() == [[v - 1, v - 1, v, v] for v in (1.0, 2.0, 3.0)]
     records.rows["a", "m", 1]["status"] = "failed"
     assert final_values(records, "a", "m", "best") == {0: 1.0, 2: 3.0}
+    (row,) = rows_of(records)
+    assert row.failed == 1
+    records.rows["b", "m", 0] = records.rows["a", "m", 1] | {"problem": "b"}
+    assert rows_of(records)[0].failed == 1, "runs of other problems count for those"
     records.rows = dict(reversed(records.rows.items()))  # runs end in any order
     assert list(final_values(records, "a", "m", "best")) == [0, 2]
 
@@ -125,6 +129,25 @@ def test_methods_are_compared_on_common_seeds():
     (told,) = comparisons(records_of("mine", 30, {("a", "first"): base, ("a", "second"): drawn(1.0, 0.3, 30, 9)}))
     assert told.verdict == "no difference shown"
     assert comparisons(records_of("mine", 30, {("a", "first"): base, ("a", "second"): better[:1]})) == []
+
+
+def test_the_smallest_effect_is_a_share_of_the_size_of_values_below_zero_too():
+    base = drawn(-100.0, 1.0, 30)
+    for gain, verdict in ((0.4, "no difference of interest"), (0.6, "better")):
+        better = [value + gain for value in base]
+        (told,) = comparisons(records_of("mine", 30, {("a", "first"): base, ("a", "second"): better}))
+        assert told.verdict == verdict
+
+
+def test_problems_under_their_own_noise_are_compared_by_regret_where_all_are():
+    records = records_of("mine", 1, {("a", "m"): [1.0], ("b", "m"): [1.0]})
+    one, other = records.header["cells"]
+    one["input_noise"] = other["input_noise"] = "own"
+    assert measures_of(records) == ("regret", "mean")
+    other["input_noise"] = 0.1
+    assert measures_of(records) == ("mean", "worst", "std")
+    one["input_noise"] = other["input_noise"] = None
+    assert measures_of(records) == ("best",)
 
 
 def test_differences_below_the_smallest_effect_are_no_verdict():

@@ -159,6 +159,41 @@ def test_packed_tables_are_read_beside_plain_ones(tmp_path, cheap):
     assert len(read_folder(results).rows) == 7
 
 
+def test_a_run_that_finished_takes_the_place_of_one_that_failed(tmp_path, cheap):
+    """In the tables of a folder and in packed ones, whichever comes first; of two that finished the first stays."""
+    cell = cheap.cells()[0]
+    first, second = {0: "failed", 1: "done", 2: "done"}, {0: "done", 1: "failed", 2: "done"}
+    for k, statuses in enumerate((first, second)):
+        for folder in (tmp_path / "shares", tmp_path / str(k)):
+            with opened(folder, cheap, (k + 1, 2) if folder.name == "shares" else (1, 1)) as table:
+                for seed, status in statuses.items():
+                    table.append(row_of(cell, seed, status=status, trials=8 + k))
+    pack([tmp_path / "0", tmp_path / "1"], tmp_path / "packed")
+    for records in (read_folder(tmp_path / "shares"), read_folder(tmp_path / "packed")):
+        assert [records.rows[cell.problem, cell.method, seed]["trials"] for seed in range(3)] == [9, 8, 8]
+        assert not records.failed
+    with opened(tmp_path / "0", cheap) as table:
+        table.append(row_of(cell, 0))
+        table.sort(cheap)
+    assert len(table.path.read_text().splitlines()) == 1 + len(first), "a row that another has replaced stays"
+
+
+def test_packing_leaves_tables_that_it_has_not_read(tmp_path, cheap):
+    own = fill(tmp_path / "results", cheap, cheap.tasks()[:2])
+    fill(tmp_path / "runs", cheap, cheap.tasks()[2:4])
+    pack([tmp_path / "runs"], tmp_path / "results")
+    assert own.exists()
+    assert len(read_folder(tmp_path / "results").rows) == 4
+
+
+def test_seeds_beyond_the_plan_count_for_its_problems_and_methods_alone(tmp_path, cheap):
+    fill(tmp_path, cheap, [(cheap.cells()[0], 11)])
+    records = read_folder(tmp_path)
+    assert records.runs == 12
+    records.header["cells"] = records.header["cells"][1:]
+    assert records.runs == cheap.runs
+
+
 def test_an_empty_folder_names_the_next_step(tmp_path):
     with pytest.raises(InputError, match="surehold campaign run"):
         read_folder(tmp_path)

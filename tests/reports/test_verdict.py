@@ -3,6 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.reports.run_report import Candidate, RunReport, Variable
@@ -190,6 +191,62 @@ def test_the_standard_error_of_a_measure_is_that_of_normal_samples(paired):
     assert error == pytest.approx(np.sqrt(2.0 * (1.0 / n + 4.0 / (2.0 * n))), rel=0.15)
 
 
+def error_of(*pair):
+    return float(re.search(r"standard error ([\d.]+)", verdict(report(*pair)).text)[1])
+
+
+def test_the_standard_error_is_welchs_where_the_points_were_not_shaken_alike():
+    one, other = np.random.default_rng(4).normal(2.0, [[0.1], [0.3]], (2, 60))
+    pair = shaken("highest observed", 5.0, one), shaken("recommended", 4.0, 0.8 * one + 0.2 * other)
+    assert error_of(*pair) == pytest.approx(stats.sem(pair[1].values - one), rel=0.05)
+    apart = np.hypot(stats.sem(one), stats.sem(pair[1].values))
+    assert error_of(pair[0], replace(pair[1], n_failed=1, without_value=2.0)) == pytest.approx(apart, rel=0.2)
+    shorter = replace(pair[1], values=pair[1].values[:40])
+    apart = np.hypot(stats.sem(one), stats.sem(shorter.values))
+    assert error_of(pair[0], shorter) == pytest.approx(apart, rel=0.05)
+
+
+def test_of_points_shaken_alike_the_error_of_a_measure_is_that_of_its_difference():
+    one, other = np.random.default_rng(5).normal([[2.0], [0.1]], [[0.5], [0.01]], (2, 100))
+    pair = [averse(shaken(name, 5.0, values), Risk("cvar")) for name, values in (("one", one), ("other", one + other))]
+    assert error_of(*pair) < 0.01
+    assert error_of(pair[0], replace(pair[1], values=pair[1].values[:99])) > 0.05
+    assert error_of(pair[0], replace(pair[1], n_failed=1, without_value=2.0)) > 0.05
+
+
+def test_the_bad_cases_are_looked_at_before_the_worst_one():
+    """Of a hundred re-queries six are bad: the fifth lowest decides where the very lowest are alike."""
+    one, other = (np.full(100, mean) + 0.01 * np.sin(np.arange(100)) for mean in (4.84, 4.72))
+    one[:6] = 2.9
+    one[0] = other[0] = 2.8
+    told = verdict(report(shaken("highest observed", 5.5, one), shaken("recommended", 4.95, other)))
+    assert told.refused
+    assert "worth about the same" in told.headline
+
+
+def test_a_worse_tail_is_told_from_a_notable_difference_on():
+    pair = (with_tail("highest observed", 5.5, 4.0, 3.9), with_tail("recommended", 4.95, 4.9, 3.8))
+    assert "but falls" not in verdict(report(*pair)).headline
+    values = 4.9 + 0.01 * np.sin(np.arange(100))
+    values[:8] = 1.38
+    turned = (shaken("highest observed", 5.5, values), with_tail("recommended", 4.95, 4.0, 3.9))
+    assert "although it falls only to 3.90 at worst (the other to 1.38)" in verdict(report(*turned)).headline
+    turned = (with_tail("highest observed", 5.5, 4.9, 3.9), with_tail("recommended", 4.95, 4.0, 1.38))
+    assert "although" not in verdict(report(*turned)).headline
+
+
+def test_a_single_trial_is_not_said_to_be_all_of_the_same():
+    told = verdict(
+        report(
+            shaken("recommended", 1.0, 0.9 + 0.01 * SPREAD, trial=0),
+            y=np.ones(1),
+            X=np.zeros((1, 3)),
+            best_trace=np.ones(1),
+        )
+    )
+    assert "nothing was found" not in told.headline
+
+
 def test_the_worst_case_is_judged_by_the_lowest_re_query_alone():
     bad = [np.append(np.linspace(0.8, 0.9, 99), low) for low in (-1.0, 0.5)]
     pair = shaken("highest observed", 1.0, bad[0]), shaken("recommended", 0.9, bad[1])
@@ -199,6 +256,11 @@ def test_the_worst_case_is_judged_by_the_lowest_re_query_alone():
         "point 0.500."
     )
     assert "At worst they differ by 1.50 (both points shaken alike)." in told.text
+    often = np.where(np.arange(100) < 10, 0.55, bad[0])  # one in ten is bad: no worse at worst
+    told = verdict(
+        report(averse(shaken("highest observed", 1.0, often), Risk("worst")), averse(pair[0], Risk("worst")))
+    )
+    assert "about the same" in told.headline
 
 
 def test_the_headline_of_a_single_point_states_the_measure():
@@ -242,6 +304,7 @@ def test_a_point_whose_re_queries_all_fail_does_not_hold():
     told = verdict(report(peak, shaken("recommended", 2.0, 2.0 + 0.01 * SPREAD)))
     assert told.refused
     assert "all 50 re-queries of it failed, the recommended point is worth 2.00 on average" in told.headline
+    assert told.headline.count("failed") == 1
 
 
 def test_points_that_are_worth_the_same_are_said_to_be_whatever_the_error():

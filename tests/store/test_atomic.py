@@ -1,9 +1,10 @@
+import hashlib
 import os
 
 import pytest
 
 from surehold.errors import InputError
-from surehold.store.atomic import checked_folder, replacing, write_file
+from surehold.store.atomic import checked_folder, new_folder, noted_writes, replacing, write_file
 
 
 def test_the_old_content_stays_until_the_new_is_whole(tmp_path):
@@ -64,3 +65,22 @@ def test_a_folder_is_made_or_refused(tmp_path):
     for place in (tmp_path / "taken", tmp_path / "taken" / "below"):
         with pytest.raises(InputError, match="choose another"):
             checked_folder(place)
+
+
+def test_a_new_folder_is_none_that_was_there(tmp_path):
+    made = [new_folder(tmp_path / "run") for _ in range(3)]
+    assert [path.name for path in made] == ["run", "run-2", "run-3"]
+    assert all(path.is_dir() for path in made)
+
+
+def test_writes_are_noted_by_the_innermost_block_and_where_they_are(tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    with noted_writes() as outer:
+        with noted_writes() as inner:
+            write_file(tmp_path / "link" / "a", "x")
+        write_file(tmp_path / "b", "x")
+    write_file(tmp_path / "c", "x")
+    assert list(inner) == [(tmp_path / "real" / "a").resolve()]
+    assert list(outer) == [(tmp_path / "b").resolve()]
+    assert inner.popitem()[1] == hashlib.sha256(b"x").hexdigest()

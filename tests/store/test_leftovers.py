@@ -38,6 +38,14 @@ def test_files_of_the_user_stay(tmp_path):
     assert there(tmp_path) == ["b.txt", "deep/own.txt", "new.txt", "own.txt"]
 
 
+def test_a_file_that_is_made_again_by_hand_is_the_users(tmp_path):
+    written(tmp_path, "a.txt", "b.txt")
+    assert written(tmp_path, "a.txt") == ["b.txt"]
+    (tmp_path / "b.txt").write_text("content of b.txt")
+    assert written(tmp_path, "a.txt") == []
+    assert (tmp_path / "b.txt").exists()
+
+
 def test_without_replacing_the_list_grows(tmp_path):
     written(tmp_path, "a.txt")
     assert written(tmp_path, "b.txt", replacing=False) == []

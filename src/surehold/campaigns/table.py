@@ -185,9 +185,7 @@ def read_folder(folder: str | Path) -> Records:
                 "give each plan a folder of its own."
             )
         for row in rows:
-            known = records.rows.get(_key(row))
-            if known is None or known["status"] == "failed":
-                records.rows[_key(row)] = row
+            _take_in(row, records.rows)
     assert records is not None
     return records
 
@@ -195,14 +193,15 @@ def read_folder(folder: str | Path) -> Records:
 def pack(folders: Sequence[str | Path], target: str | Path) -> Path:
     """Write the rows of several folders of one plan as one compressed table into the folder `target`; return its path.
 
-    Of runs that several folders hold, the first one's are kept; the target's own plain tables become part of it.
+    Of runs that several folders hold, the first that finished are kept, of those that failed in all the last; the
+    target's own plain tables become part of it.
     """
     first, *others = [read_folder(folder) for folder in folders]
     for other in others:
         if other.header["plan"] != first.header["plan"]:
             raise InputError(f"plans '{first.header['plan']}' and '{other.header['plan']}' do not go into one table.")
-        for key, row in other.rows.items():
-            first.rows.setdefault(key, row)
+        for row in other.rows.values():
+            _take_in(row, first.rows)
     rows = sorted(first.rows.values(), key=lambda row: (row["seed"], row["problem"], row["method"]))
     raw = b"".join([_line(first.header), *map(_line, rows)])
     place = checked_folder(target)
@@ -293,6 +292,13 @@ def _parsed(line: bytes) -> dict[str, Any] | None:
 
 def _line(row: Mapping[str, Any]) -> bytes:
     return json.dumps(row, separators=(",", ":"), allow_nan=False, default=list).encode() + b"\n"
+
+
+def _take_in(row: dict[str, Any], rows: dict[Key, dict[str, Any]]) -> None:
+    """Add a row to those of other tables; it takes the place of one that failed."""
+    known = rows.get(_key(row))
+    if known is None or known["status"] == "failed":
+        rows[_key(row)] = row
 
 
 def _key(row: Mapping[str, Any]) -> Key:
