@@ -261,6 +261,7 @@ def test_the_worst_case_is_judged_by_the_lowest_re_query_alone():
         report(averse(shaken("highest observed", 1.0, often), Risk("worst")), averse(pair[0], Risk("worst")))
     )
     assert "about the same" in told.headline
+    assert not told.refused
 
 
 def test_the_headline_of_a_single_point_states_the_measure():

@@ -81,6 +81,15 @@ def test_task_quality_of_a_shelf():
 def test_gravity_wrenches_turn_about_the_origin():
     w = gravity_wrenches(2.0, (0.1, 0, 0), [[0, 0, -1]], torque_length=0.05, origin=(0, 0, 0))
     np.testing.assert_allclose(w, [[0, 0, -2, 0, 4, 0]])
+    w = gravity_wrenches(2.0, (0.1, 0, 0), [[0, 0, -1]], torque_length=0.05, origin=(0.1, 0, 0))
+    np.testing.assert_allclose(w, [[0, 0, -2, 0, 0, 0]], atol=1e-12)
+
+
+def test_seven_wrenches_close_where_they_span_a_simplex_around_the_origin():
+    simplex = np.vstack([np.eye(6), -np.ones(6)])
+    assert force_closure(simplex)
+    assert not force_closure(simplex + 1.5 * np.eye(6)[0])
+    assert not force_closure(simplex[:6])
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ from surehold.errors import InputError
 from surehold.optimization.acquisition.criteria import expected_improvement
 from surehold.optimization.acquisition.scales import CRITERIA, Acquisition, CriterionName, criterion_name
 from surehold.optimization.box import Box
-from surehold.optimization.constraints.admission import Admission
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import BORDERS, Perturbations
 from surehold.optimization.noise.quadratures import Quadrature, exact, sigma_points
@@ -108,29 +107,10 @@ def test_probability_and_bound_by_scipy(scale, posterior):
         np.testing.assert_allclose(found, values, atol=1e-12, err_msg=base)
 
 
-@pytest.mark.parametrize("name", ["ei", "log_ei", "ucb"])
-def test_what_is_required_weighs_each_criterion_as_its_nature_is(name, posterior):
-    """An improvement is multiplied by a probability, its logarithm gains the logarithm; a bound counts from 1/2 on."""
-
-    class Ramp:
-        def log_probability(self, V, gradient=False):
-            slope = np.zeros(V.shape)
-            slope[:, 0] = 1.0 / V[:, 0]
-            return np.log(V[:, 0]), slope if gradient else slope[:0]
-
-    acquisition, P = acquisition_of(posterior, name), U[:, 0]
-    weighed = Admission(requirements=(Ramp(),)).weighed(acquisition)
-    expected = {
-        "ei": np.multiply,
-        "log_ei": lambda value, P: np.log(np.exp(value) * P),
-        "ucb": lambda value, P: np.where(P >= 0.5, value, -1e100 * (1.0 - P)),
-    }[name](acquisition(U), P)
-    np.testing.assert_allclose(weighed(U), expected, rtol=1e-9)
-    values, gradients = weighed.with_gradient(U)
-    np.testing.assert_allclose(values, expected, rtol=1e-9)
-    steps = 1e-6 * np.eye(2)
-    numeric = [(weighed(u + steps) - weighed(u - steps)) / 2e-6 for u in U]
-    np.testing.assert_allclose(gradients, numeric, rtol=1e-4, atol=1e-6)
+def test_natures(posterior):
+    """An improvement is multiplied by a probability, its logarithm gains the logarithm; a bound has no zero."""
+    natures = {name: acquisition_of(posterior, name).nature for name in ("ei", "pi", "ulog_ei", "robust_ucb")}
+    assert natures == {"ei": "improvement", "pi": "improvement", "ulog_ei": "logarithm", "robust_ucb": "bound"}
 
 
 @pytest.mark.parametrize("name", ["robust_ei", "uei", "robust_ucb"])

@@ -46,8 +46,10 @@ def test_gradients_by_differences():
             check_grad(lambda v: model.probability(v[None])[0][0], lambda v: model.probability(v[None], True)[1][0], u)
             < 1e-5
         )
-    noisy = Succeeds(model, Perturbations.of(InputNoise.unit(0.1), Box.unit(2), "unscented", "clip"))
-    for u in RNG.random((5, 2)):
+    strays = Perturbations.of(InputNoise.unit(0.1), Box.unit(2), "unscented", "clip")
+    noisy, once = Succeeds(model, strays, 2.0), Succeeds(model, strays)
+    for u in np.vstack([RNG.random((5, 2)), [0.02, 0.97]]):
+        assert noisy.log_probability(u[None])[0] == pytest.approx(2.0 * once.log_probability(u[None])[0])
         error = check_grad(
             lambda v: noisy.log_probability(v[None])[0][0], lambda v: noisy.log_probability(v[None], True)[1][0], u
         )

@@ -9,7 +9,7 @@ from surehold.optimization.constraints.outcome import Within, execution_probabil
 from surehold.optimization.limits import Limit
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.noise.quadratures import exact
+from surehold.optimization.noise.quadratures import exact, gauss_hermite
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 
 RNG = np.random.default_rng(0)
@@ -114,6 +114,17 @@ def test_under_noise_the_share_of_executions_of_a_linear_output():
     inside, outside = np.exp(within.log_probability(np.array([[edge - 0.005], [edge + 0.005]]))[0])
     assert inside > 0.99
     assert outside < 0.01
+
+
+def test_executions_count_by_the_weights_of_their_perturbations(posterior):
+    limit, perturbations = Limit("c", 0.8, 2.0), Perturbations(gauss_hermite(np.diag([0.02, 0.05])))
+    U = np.random.default_rng(4).random((5, 2))
+    each = [
+        execution_probability([(posterior, limit)], Perturbations(exact(2)), around)
+        for around in perturbations.around(U)
+    ]
+    expected = np.array(each) @ perturbations.quadrature.weights
+    np.testing.assert_allclose(execution_probability([(posterior, limit)], perturbations, U), expected)
 
 
 def test_two_outputs_share_the_place_of_an_execution(posterior):
