@@ -1,5 +1,8 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.stats import norm
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
@@ -90,6 +93,37 @@ def test_error_is_that_at_fresh_inputs():
     at_fresh, weighted, alone = np.mean(errors, axis=0)
     assert weighted == pytest.approx(at_fresh, rel=0.4)
     assert alone < 0.7 * at_fresh
+
+
+def test_each_number_by_hand():
+    X, y = crowded(24, 1)
+    posterior = GaussianProcess().condition(X, y, np.random.default_rng(0))
+    found, left, w = diagnosis(posterior, X, y), posterior.left_out(), shares(X)
+    mean, between = left.mean.mean(axis=0), left.mean.var(axis=0)
+    variance = left.variance.mean(axis=0) + between
+    constant = [np.average(np.delete(y, i), weights=np.delete(w, i)) for i in range(24)]
+    mine, its = (y - mean) ** 2, (y - constant) ** 2
+    gap = w @ (mine - its)
+    assert found.error == pytest.approx(np.sqrt(w @ mine / (w @ its)))
+    assert found.excess == pytest.approx(gap / np.sqrt(np.sum(w**2 * (mine - its - gap) ** 2)))
+    assert found.coverage == pytest.approx(w @ (np.abs(y - mean) < norm.ppf(0.975) * np.sqrt(variance)))
+    assert found.disagreement == pytest.approx(w @ (between / variance))
+    assert found.resolution == pytest.approx(np.median(posterior.length_scales, axis=0).min() * np.sqrt(24))
+
+
+def test_more_than_a_constant_by_chance_is_not_said_to_explain_nothing():
+    told = Diagnosis(error=1.2, excess=0.9, coverage=0.95, disagreement=0.1, resolution=1.0, n=100)
+    assert not told.explains_nothing
+    assert replace(told, excess=1.1).explains_nothing
+
+
+def test_rounding_between_values_at_one_input_is_no_contradiction():
+    X, y = crowded(24, 1)
+    X, y = np.vstack([X, X[:1]]), np.append(y, y[0] + 1e-8)
+    posterior = GaussianProcess().condition(X, y, np.random.default_rng(0))
+    assert not diagnosis(posterior, X, y).contradicted
+    y[-1] = y[0] + 1e-3
+    assert diagnosis(GaussianProcess().condition(X, y, np.random.default_rng(0)), X, y).contradicted
 
 
 def test_a_model_that_sees_islands_is_found_out():

@@ -7,6 +7,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 import surehold as sh
+from surehold.defaults import LOW_TAIL_FROM
 from surehold.optimization.assembly import assembled
 from surehold.optimization.low_tail import LowTail, low_tail_of
 from surehold.optimization.trials import Trials
@@ -33,6 +34,13 @@ def test_the_map_is_smooth_increasing_and_leaves_the_upper_half():
     h = 1e-6
     slopes = (tail.apply(y + h) - tail.apply(y - h)) / (2.0 * h)
     assert np.exp(tail.log_slopes(y)) == pytest.approx(slopes, rel=1e-6)
+
+
+def test_of_few_trials_nothing_is_said():
+    X = places(64, 1)
+    y = -np.exp(20.0 * np.abs(X[:, 0] - 0.3))
+    found = [low_tail_of(X[:n], y[:n]) is not None for n in (LOW_TAIL_FROM - 1, LOW_TAIL_FROM)]
+    assert found == [False, True]
 
 
 @pytest.mark.parametrize(("response", "compressed"), [(valley, True), (ripple, False)])

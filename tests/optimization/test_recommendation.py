@@ -5,11 +5,14 @@ import re
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.optimize import brentq
 
 import surehold as sh
 from surehold.errors import InputError
 from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.recommendation import Outcome, expectation_at, in_digits, outside_in_words
+from surehold.optimization.noise.quadratures import gauss_hermite
+from surehold.optimization.recommendation import Outcome, expectation_at, in_digits, outside_in_words, recommendation
+from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 
 LINE = sh.Box({"x": (-1.0, 1.0)})
 
@@ -238,3 +241,44 @@ def test_a_box_that_is_not_plain_is_shown_by_its_parameters():
     box = sh.Box({"f": (1e-4, 1.0, "log"), "g": ["a", "b"]})
     found = sh.minimize(lambda p: (np.log(p["f"]) + 2.0) ** 2, box, n_trials=12, seed=0).recommendation
     assert repr(found).startswith("Recommendation(parameters={'f': 0.1")
+
+
+def test_a_mixture_of_narrow_normals_by_scipy():
+    means, stds, weights = np.array([0.0, 1.0, 3.0]), np.array([1e-3, 0.2, 1e-4]), np.array([0.2, 0.5, 0.3])
+    outcome = Outcome(means, stds, weights)
+
+    def below(value):
+        return float(weights @ stats.norm.cdf(value, means, stds))
+
+    for value in (-1e-3, 2e-3, 0.9, 2.9999, 3.00005):
+        assert outcome.probability_below(value) == pytest.approx(below(value), abs=1e-12)
+    for level in (0.05, 0.4, 0.71, 0.999):
+        assert outcome.quantile(level) == pytest.approx(brentq(lambda v, q=level: below(v) - q, -1.0, 4.0), abs=1e-9)
+    assert outcome.mean == pytest.approx(weights @ means)
+    assert outcome.std**2 == pytest.approx(weights @ (stds**2 + means**2) - (weights @ means) ** 2)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_is_stated_by_hand(sign):
+    """Of an unsure model and perturbations of unequal weights: every particle by itself, then their mean."""
+    rng = np.random.default_rng(6)
+    X = rng.random((6, 2))
+    posterior = GaussianProcess(noise=0.1).condition(X, np.sin(6.0 * X[:, 0]) + X[:, 1], rng)
+    reached, u = Perturbations(gauss_hermite(np.diag([0.02, 0.01]))), np.array([0.4, 0.6])
+    found = recommendation(posterior, reached, None, u, sh.Box.unit(2), 0.3, (u, 0.3), 6, sign)
+    points, weights = reached.around(u[None])[0], reached.quadrature.weights
+    moments = posterior.moments(points)
+    each = np.sqrt(moments.variance + 0.01)
+
+    def below(value):
+        return float((stats.norm.cdf(value, moments.mean, each) @ weights).mean())
+
+    expected = (moments.mean @ weights).mean()
+    assert found.mean == pytest.approx(sign * expected)
+    assert found.expectation.mean == pytest.approx(sign * expected)
+    assert found.execution.mean == pytest.approx(sign * expected)
+    assert found.quantile == pytest.approx(sign * brentq(lambda v: below(v) - 0.05, -9.0, 9.0), abs=1e-8)
+    assert found.observed == sign * 0.3
+    curve = moments.mean.mean(axis=0)
+    assert found.outcome_std == pytest.approx(np.sqrt(weights @ (curve - weights @ curve) ** 2))
+    assert np.ptp(moments.mean @ weights) > 0.01, "the particles must differ for this test to say anything"

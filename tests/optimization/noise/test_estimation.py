@@ -2,6 +2,7 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import surehold as sh
 from surehold.errors import InputError
@@ -30,6 +31,17 @@ def test_noise_of_repeated_inputs():
         y = (lambda U: np.sin(4.0 * U[:, 0]) + 2.0 * U[:, 1])(places + 0.02 * rng.standard_normal(places.shape))
         shares.append(np.sqrt(noise_from_repeats(places, y).unit_covariance(BOX)[0, 0]))
     assert np.mean(shares) == pytest.approx(0.02, rel=0.15)
+
+
+@pytest.mark.parametrize("size", [2, 5])
+def test_repeats_on_a_plane_tell_the_share_by_their_degrees_of_freedom(size):
+    rng = np.random.default_rng(3)
+    places = np.repeat(rng.random((80 // size, 2)), size, axis=0)
+    y = places @ [1.0, 2.0] + 0.05 * rng.standard_normal(80)
+    share = np.sqrt(y.reshape(-1, size).var(axis=1, ddof=1).mean() / 5.0)
+    assert np.sqrt(noise_from_repeats(places, y).unit_covariance(BOX)[0, 0]) == pytest.approx(share, rel=0.05)
+    with pytest.raises(InputError, match="repeated 3 times"):
+        noise_from_repeats(np.repeat(places[::size][:4], [4, 1, 1, 1], axis=0), y[:7])
 
 
 def test_no_guess_without_data():
@@ -106,6 +118,25 @@ def test_a_constant_offset_is_named_and_is_no_noise(n):
 def test_an_offset_alone_is_no_noise():
     with pytest.warns(UserWarning, match="T_K by 30"), pytest.raises(InputError, match="no sign of input noise"):
         noise_from_reached(MIXED, *reports(np.tile([0.0, 30.0], (6, 1))))
+
+
+@pytest.mark.parametrize(("factor", "named"), [(0.98, False), (1.02, True)])
+def test_an_offset_is_one_where_students_test_of_so_many_variables_says_so(factor, named):
+    n, level = 12, 1e-3 / 2
+    shape = np.random.default_rng(6).standard_normal((n, 2))
+    shape = (shape - shape.mean(axis=0)) / shape.std(axis=0, ddof=1)
+    offset = factor * stats.t.isf(level / 2, n - 1) / np.sqrt(n)
+    strays = (shape + np.array([offset, 0.0])) * [1e-5, 20.0]
+    assert (stats.ttest_1samp(strays[:, 0], 0.0).pvalue < level) == named
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        noise_from_reached(MIXED, *reports(strays))
+    assert len(found) == named
+
+
+def test_reports_fewer_than_variables_and_two_tell_nothing():
+    with pytest.raises(InputError, match="at least 4"):
+        noise_from_reached(BOX, np.full((3, 2), 0.5), np.full((3, 2), 0.5) + np.diag([0.1, 0.2, 0.3])[:, :2])
 
 
 def test_noise_without_offset_is_seldom_taken_for_one():

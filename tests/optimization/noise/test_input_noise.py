@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import pytest
 
@@ -143,6 +145,24 @@ def test_a_covariance_of_any_units_and_with_exact_variables(S):
         x = optimizer.ask()
         optimizer.tell(x, -float(np.square(MIXED.to_unit(x) - 0.4).sum()))
     assert np.isfinite(optimizer.recommend().mean)
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [
+        InputNoise({"dx": 0.003, "dy": 0.0}),
+        InputNoise.unit(0.04),
+        InputNoise.uniform({"dx": 0.003, "dy": 0.006}),
+        InputNoise(covariance=[[1e-6, 5e-7], [5e-7, 1e-6]]),
+        InputNoise.samples([[0.001, 0.002], [0.0, -0.003], [0.004, 0.0]]),
+    ],
+    ids=repr,
+)
+def test_constant_noise_comes_back_from_plain_data(noise):
+    found = InputNoise.from_json(json.loads(json.dumps(noise.to_json())))
+    assert type(found.kind) is type(noise.kind)
+    np.testing.assert_array_equal(found.unit_covariance(HAND), noise.unit_covariance(HAND))
+    np.testing.assert_array_equal(found.unit_mean(HAND), noise.unit_mean(HAND))
 
 
 def test_rounding_between_the_halves_of_a_covariance_is_taken_out():

@@ -87,6 +87,20 @@ def test_perturbations_of_noise_that_varies_follow_it():
     np.testing.assert_allclose(around[:, :, 1], 0.5)
 
 
+def test_perturbations_of_noise_that_varies_have_its_covariance():
+    covariance = np.array([[0.01, 0.008], [0.008, 0.02]])
+    perturbations = Perturbations.of(InputNoise.varying(lambda x: covariance * x[0]), Box.unit(2), "quasi_monte_carlo")
+    u = np.array([[0.5, 0.5]])
+    offsets, weights = perturbations.around(u)[0] - u, perturbations.quadrature.weights
+    np.testing.assert_allclose((weights[:, None] * offsets).T @ offsets, 0.5 * covariance, rtol=1e-9)
+
+
+@pytest.mark.parametrize("border", ["clip", "keep"])
+def test_closed_forms_know_no_border(border):
+    with pytest.raises(InputError, match="'closed_form' is for Gaussian noise"):
+        Perturbations.of(InputNoise.unit(0.1), Box.unit(2), "closed_form", border)
+
+
 @pytest.mark.parametrize("rule", ["unscented", "quasi_monte_carlo"])
 def test_noise_that_acts_in_a_small_part_of_the_box_is_met_there(rule):
     noise = InputNoise.varying(lambda x: [0.08, 0.02] if np.all(np.abs(x - 0.2) <= 0.02) else [0.0, 0.0])
