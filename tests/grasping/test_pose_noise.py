@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
 from surehold.grasping import Pose, PoseNoise, Simulator, default_pose, robust_quality
@@ -34,6 +35,22 @@ def test_the_disturbance_is_a_truncated_normal_about_the_grasp_center(bottle):
         assert stats.kstest(moved[:, axis], stats.truncnorm(-3, 3, scale=0.010 / 3).cdf).pvalue > 1e-3
     only_turns, _ = shifts(bottle, pose, disturbed_poses(bottle, pose, PoseNoise(shift=0.0), n=50))
     np.testing.assert_allclose(only_turns, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("disturbed", ["hand", "object"])
+def test_each_pose_is_disturbed_as_it_is_written(bottle, disturbed):
+    """X -> c + Rx Ry Rz (x - c) + d, of truncated normals of a Halton sequence, by matrices (4, 4)."""
+    pose, center = pose_at(bottle, -0.03), np.asarray(bottle.hand.grasp_center)
+    draws = stats.truncnorm.ppf(stats.qmc.Halton(6, rng=3).random(8), -3, 3) / 3.0
+    palm = np.vstack([pose.matrix[:3], [0, 0, 0, 1]])
+    about = center if disturbed == "hand" else pose.apply(center)
+    for found, draw in zip(disturbed_poses(bottle, pose, PoseNoise(0.02, 0.3), 8, 3, disturbed), draws, strict=True):
+        rx, ry, rz = (Rotation.from_rotvec(0.3 * draw[3 + k] * np.eye(3)[k]).as_matrix() for k in range(3))
+        D = np.eye(4)
+        D[:3, :3] = rx @ ry @ rz
+        D[:3, 3] = about - D[:3, :3] @ about + 0.02 * draw[:3]
+        expected = palm @ D if disturbed == "hand" else np.linalg.inv(D) @ palm
+        np.testing.assert_allclose(found, expected[:3], atol=1e-12)
 
 
 def test_draws_are_common_and_without_noise_all_trials_are_alike(bottle):

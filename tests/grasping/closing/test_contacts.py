@@ -119,6 +119,8 @@ def test_the_share_of_a_pass():
     assert pass_share(0.003, 0.01, 0.003) == 0.0
     assert pass_share(0.0015, 0.01, 0.003) == pytest.approx(0.5)
     assert pass_share(0.001, 0.001, 0.003) == 0.0, "what stays is no pass"
+    assert pass_share(0.0015, 0.0018, 0.003) == pytest.approx(0.5 * 0.4)
+    assert pass_share(-1e-6, 0.01, 0.003) == 1.0
 
 
 def test_blending_is_the_mean_force_at_the_mean_place():

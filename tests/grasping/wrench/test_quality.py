@@ -16,6 +16,7 @@ from surehold.grasping import (
     soft_finger_torsion,
     wrench_quality,
 )
+from surehold.grasping.wrench.friction_cones import CheckedContacts
 from surehold.grasping.wrench.quality import GRAVITY_DIRECTIONS, Measure
 
 BOTTLE = shipped_object("bottle")
@@ -127,6 +128,21 @@ def test_signed_epsilon_tells_how_far_an_open_grasp_is_from_closure():
     ).signed_epsilon
     assert expected < 0.0
     assert measure.value(points, normals, wrench) == pytest.approx(lacking(-expected))
+
+
+def test_without_contacts_it_is_the_mean_way_of_the_fingers():
+    gaps = np.array([[0.02, 0.01], [-0.001, 0.03]])
+    measure = Measure("signed_epsilon", BOTTLE, 0.5)
+    assert measure.without_contacts(gaps) == pytest.approx(lacking(0.005 / BOTTLE.torque_length))
+
+
+@pytest.mark.parametrize("convention", ["normal_unit", "unit_magnitude"])
+def test_cones_of_compiled_trials_are_those_of_contacts(convention):
+    cones = Measure("epsilon", BOTTLE, 0.5, torsion=0.002, convention=convention).round_cones()
+    contacts = CheckedContacts.checked(
+        [[0, 0, 0]], [[1.0, 0, 0]], 0.5, BOTTLE.torque_length, torsion=0.002, convention=convention
+    )
+    assert (cones.torsion, 1.0 / cones.divisor) == pytest.approx((contacts.torsion[0], contacts.scale[0]))
 
 
 def test_friction_is_the_objects_own_unless_given():

@@ -43,6 +43,12 @@ def test_object_number_does_not_depend_on_place_and_size():
     assert object_wrench_space(0.01 * vertices + [5.0, -3.0, 2.0], faces).radius == pytest.approx(radius, rel=1e-9)
 
 
+def test_torques_are_about_the_plain_mean_of_the_vertices():
+    vertices, faces = cuboid(np.array([3.0, 2.0, 1.0]))
+    more = np.vstack([vertices, vertices[:2]])
+    assert object_wrench_space(more, faces).origin == pytest.approx(tuple(more.mean(axis=0)))
+
+
 def vertex_centered_radius_by_qhull(wrenches):
     hull = ConvexHull(wrenches, qhull_options="QJ Pp")
     center = wrenches[hull.vertices].mean(axis=0)

@@ -16,6 +16,11 @@ def test_grows_after_three_successes_in_a_row_and_shrinks_after_as_many_failures
     )
 
 
+def test_it_grows_to_its_largest_side_by_trials_that_are_better_than_all_before():
+    assert side_after(np.arange(1.0, 40.0), 1, 2) == 1.6
+    assert side_after(np.array([10.0, 1.0, 2.0, 3.0, 4.0]), 1, 2) == 0.4
+
+
 def test_an_improvement_of_rounding_is_none_and_a_collapsed_box_starts_again():
     assert side_after(np.array([5.0, *(5.0 + 1e-6 * np.arange(1, 5))]), 1, 2) == 0.4
     sides = [side_after(np.array([5.0, *[1.0] * (4 * k)]), 1, 2) for k in range(9)]
