@@ -46,6 +46,18 @@ def linkage() -> str:
     return _LINKAGE.format(_SIDE.format(s="l", x=-0.065, y=-0.05, a=1) + _SIDE.format(s="r", x=0.065, y=0.05, a=-1))
 
 
+def mimicking_linkage() -> str:
+    """Return MJCF of the same gripper as URDFs describe it: no loop is closed, all joints follow that of the left bar.
+
+    Neither bar is a finger, and no joint of a finger leads.
+    """
+    pairs = (("drive_r", 1), ("inner_l", 1), ("inner_r", 1), ("pad_l", -1), ("pad_r", -1))
+    equal = "".join(f'<joint joint1="{name}" joint2="drive_l" polycoef="0 {c} 0 0 0"/>' for name, c in pairs)
+    model = linkage()
+    start, end = model.index("<equality>"), model.index("</mujoco>")
+    return f"{model[:start]}<equality>{equal}</equality>{model[end:]}"
+
+
 def three_fingers(spread: float = 120.0) -> str:
     """Return MJCF of three fingers of two joints that stand up around a plate, the first one at -x."""
     fingers = ""

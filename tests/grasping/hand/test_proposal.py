@@ -9,7 +9,7 @@ from surehold.errors import InputError
 from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.inspection import finger_motions, hand_faults
 from surehold.grasping.hand.proposal import propose_hand
-from tests.grasping.hand_models import SLIDING, TURNING, five_fingers, linkage, three_fingers
+from tests.grasping.hand_models import SLIDING, TURNING, five_fingers, linkage, mimicking_linkage, three_fingers
 
 
 @pytest.fixture
@@ -110,8 +110,10 @@ def test_three_fingers_around_a_plate(propose, spread):
         assert found.config.palm.x == [1.0, 0.0, 0.0], "from the single finger to the two others"
 
 
-def test_bars_of_a_linkage_are_no_fingers(propose):
-    found = propose(linkage())
+@pytest.mark.parametrize("model", [linkage(), mimicking_linkage()])
+def test_bars_of_a_linkage_are_no_fingers(propose, model):
+    """Where all joints follow a bar, as in models of the Robotiq 2F-85, none was found that leads: a traceback."""
+    found = propose(model)
     assert list(found.config.fingers.values()) == [["inner_l", "pad_l"], ["inner_r", "pad_r"]]
     assert closed_of(found) == {"drive_l": 0.5}, "the bar that an actuator drives"
     assert found.roles["pad_r"] == "follows drive_l"
@@ -164,6 +166,7 @@ def test_one_of_two_hands_by_its_body(propose):
         (SLIDING, ".xml"),
         (TURNING, ".urdf"),
         (linkage(), ".xml"),
+        (mimicking_linkage(), ".xml"),
     ],
 )
 def test_what_is_proposed_loads_and_closes(propose, tmp_path, model, suffix):

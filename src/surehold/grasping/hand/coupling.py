@@ -14,7 +14,7 @@ In the order in which they count:
    still free are moved the least way that meets them; where that does not do, all joints of the model that are free.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -71,6 +71,18 @@ class JointCouplings:
     def followers(self) -> set[str]:
         """Return the joints that follow others whatever is named, unless they are named themselves."""
         return {self._rest.joint_names[j] for j in self._equal | self._described}
+
+    def followed(self, names: Iterable[str]) -> list[str]:
+        """Return the joints at the head of those that some follow by an equality, in the order of the followers."""
+        heads = []
+        for name in names:
+            j, seen = self._rest.joint_ids[name], set[int]()
+            while j in self._equal and j not in seen:
+                seen.add(j)
+                j = self._equal[j].joint
+            if seen and j >= 0 and j not in self._equal:
+                heads.append(self._rest.joint_names[j])
+        return list(dict.fromkeys(heads))
 
     def posture(self, named: Mapping[str, float], start: Array, what: str) -> Array:
         """Return all joints (j,): those named, those that follow them, the others where they `start` (j,).

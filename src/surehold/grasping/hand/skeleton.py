@@ -250,6 +250,10 @@ class _Tree:
             for group in groups:
                 for leaf in group:
                     tied[leaf] |= set().union(*groups) - {leaf}
+        for middle in coupled:  # two bars that follow a third joint are coupled, too
+            for leaf in coupled:
+                if middle in coupled[leaf]:
+                    coupled[leaf] |= coupled[middle] - {leaf}
         return closed, coupled
 
     def _of_tendon(self, t: int) -> list[int]:

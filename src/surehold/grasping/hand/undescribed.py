@@ -51,8 +51,9 @@ class UndescribedHand:
         self._ids = resting.joint_ids
         #: of all joints that turn or slide [rad or m]; a whole turn or a meter each way without limits
         self.ranges = {name: resting.range(j) for name, j in self._ids.items() if resting.moves(j)}
-        joints = [*skeleton.driving, *(joint for finger in fingers.values() for joint in finger)]
-        self._still, self.leaders = self._led(JointCouplings(resting), dict.fromkeys(joints))
+        own, couplings = [joint for finger in fingers.values() for joint in finger], JointCouplings(resting)
+        joints = [*skeleton.driving, *own, *couplings.followed(own)]  # a bar that is no finger may lead them all
+        self._still, self.leaders = self._led(couplings, dict.fromkeys(joints))
         first = next(iter(self.leaders))
         away = np.clip(self._still[self._ids[first]], *self.ranges[first])
         described["preshapes"] = {"p": {"open": {first: away}, "closed": {first: away + self._steps[first]}}}
