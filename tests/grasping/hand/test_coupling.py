@@ -10,6 +10,7 @@ from surehold.grasping.hand.configuration import HandConfig
 from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.kinematics import link_ends
 from surehold.grasping.hand.synergy import closing_motion
+from tests.grasping.hand_models import linkage
 
 HINGES = """
 <mujoco><compiler angle="radian"/><option gravity="0 0 0"/>
@@ -170,6 +171,23 @@ def test_a_closed_loop_is_met_as_mujoco_meets_it(tmp_path):
         middle = ends[hand.link_names.index("follower")].mean(axis=0)
         np.testing.assert_allclose(middle, pad.xpos, atol=1e-6)
     assert abs(found["spring"]) > 0.3
+
+
+@pytest.mark.parametrize("top", [0.8, 1.4, 2.0])
+def test_a_loop_stays_on_its_branch(tmp_path, top):
+    """In a parallelogram each bar turns as far as the one that is driven, and what it carries keeps its direction.
+
+    Solved at once, the loop of .8 closed as a crossed one, those of 1.4 and 2 after whole turns. All bars are in line
+    at .98, where crossed and parallel ones meet.
+    """
+    text = linkage().replace('range="0 .5"', f'range="0 {top}"').replace('range="-.9 .1"', 'range="-3 .1"')
+    text, fingers = text.replace('name="base"', 'name="palm"'), {s: [f"inner_{s}", f"pad_{s}"] for s in "lr"}
+    hand = hand_of(tmp_path, text, fingers, {"drive_l": top})
+    for t in (0.25, 1.0):
+        found = angles(hand, t * 2.0 * np.pi)
+        for side in "lr":
+            assert found[f"inner_{side}"] == pytest.approx(t * top, abs=1e-5)
+            assert found[f"pad_{side}"] == pytest.approx(-t * top, abs=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ __all__ = ["JointCouplings"]
 Array = NDArray[np.float64]
 _MET: Final = 1e-4  #: a loop that is open by less is closed [m, rad]
 _STEPS: Final = 50
+_STRIDE: Final = 0.1  #: of the joints that lead, while those that follow in a loop are sought [rad, m]
 
 
 class _Leader(NamedTuple):
@@ -107,7 +108,7 @@ class JointCouplings:
         for j in follows:
             self._follow(j, follows, q, done, ())
         if self._loops:
-            self._close_loops(q, done, what)
+            self._move_loops(q, start, done, what)
         return q
 
     def range(self, j: int) -> tuple[float, float]:
@@ -157,8 +158,36 @@ class JointCouplings:
         q[j] = leader.references[0] + np.polynomial.polynomial.polyval(away, leader.polynomial)
         done.add(j)
 
-    def _close_loops(self, q: Array, done: set[int], what: str) -> None:
-        """Move free joints until the model's loops are closed: Gauss-Newton, each step the shortest one."""
+    def _move_loops(self, q: Array, start: Array, done: set[int], what: str) -> None:
+        """Move free joints until the loops are closed where the others are moved from `start` (j,) to q (j,).
+
+        In strides, each from where the last two point to: at once, half a radian ended whole turns or on the other
+        branch of a linkage, and where its bars are in line the branches meet.
+        """
+        leading = sorted(done)
+        end = q[leading]
+        way = end - start[leading]
+        parts = max(1, int(np.ceil(np.abs(way).max(initial=0.0) / _STRIDE)))
+        before, gap, worst = q.copy(), 0.0, 0
+        for part in range(1, parts + 1):
+            guess = 2.0 * q - before
+            guess[leading] = end if part == parts else start[leading] + part / parts * way
+            before[:], q[:] = q, guess
+            gap, worst = self._close_loops(q, done)
+            if gap >= _MET:
+                before[:] = q
+        if gap >= _MET:
+            name = self._model.eq(worst).name or f"number {worst}"
+            raise InputError(
+                f"hand '{self._rest.config.name}': {what} leaves the model's loop '{name}' open by {1e3 * gap:.3g} mm; "
+                "give angles that its links can reach."
+            )
+
+    def _close_loops(self, q: Array, done: set[int]) -> tuple[float, int]:
+        """Move free joints until the model's loops are closed: Gauss-Newton, each step the shortest one.
+
+        Return by how much the loops stay open [m, rad], and the equality that does most.
+        """
         fingers = [j for joints in self._rest.fingers.values() for j in joints if j not in done]
         others = [j for j in range(self._model.njnt) if self._rest.moves(j) and j not in done]
         gap, worst = 0.0, 0
@@ -168,18 +197,14 @@ class JointCouplings:
                 gaps, slopes, ids = self._loop_gaps(q)
                 felt = np.abs(slopes[:, columns]).max(axis=1, initial=0.0) > 1e-9
                 if not felt.any():
-                    return
+                    return 0.0, 0
                 gap, worst = float(np.abs(gaps[felt]).max()), int(ids[felt][np.abs(gaps[felt]).argmax()])
                 if gap < 1e-2 * _MET:
-                    return
+                    return gap, worst
                 q[free] -= np.linalg.lstsq(slopes[np.ix_(felt, columns)], gaps[felt], rcond=1e-6)[0]
             if gap < _MET:
-                return
-        name = self._model.eq(worst).name or f"number {worst}"
-        raise InputError(
-            f"hand '{self._rest.config.name}': {what} leaves the model's loop '{name}' open by {1e3 * gap:.3g} mm; "
-            "give angles that its links can reach."
-        )
+                break
+        return gap, worst
 
     def _loop_gaps(self, q: Array) -> tuple[Array, Array, NDArray[np.int32]]:
         """Return residuals (r,), Jacobian (r, v) and equalities (r,) of the loops."""
