@@ -39,6 +39,15 @@ def test_numpy_reads_what_is_written_and_it_comes_back(tmp_path):
     assert (read.confidence, read.posture, read.quality) == (0.7, -0.5, 0.06)
 
 
+def test_no_grasp_is_written_over_another_whose_name_differs_in_signs_only(tmp_path):
+    names = ["grasp 1", "grasp_1", "grasp.1", "grasp_1_2", "x" * 101, "x" * 102, "", "grasp"]
+    grasps = [StoredGrasp(name, 0.5, (float(i), 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)) for i, name in enumerate(names)]
+    write_dexgraspbench_files(tmp_path, GraspFile("mug", "", tuple(grasps), "mug"), ())
+    back = read_grasps(tmp_path).grasps
+    assert sorted(grasp.position[0] for grasp in back) == list(range(len(names)))
+    assert [grasp.position[0] for grasp in back if grasp.name == "grasp_1"] == [0.0]
+
+
 def written(path, protocol=3, **changes):
     row = {
         "obj_pose": ZERO,

@@ -19,6 +19,7 @@ import io
 import pickle
 import pickletools
 from collections.abc import Sequence
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, Final
 
@@ -48,8 +49,9 @@ _PARTS: Final = ("pregrasp_qpos", "grasp_qpos", "squeeze_qpos")
 def write_dexgraspbench_files(folder: str | Path, file: GraspFile, joints: Sequence[str]) -> None:
     """Write grasps, whose gripper frame is the root frame, as NAME.npy into a folder; `joints` is the model's order.
 
-    Joints that a grasp does not name are written as 0. Raises InputError if a grasp is not usable or names a joint that
-    is not in the order, or a file cannot be written.
+    What a name of a file cannot hold becomes "_", and names that are then the same get numbers. Joints that a grasp
+    does not name are written as 0. Raises InputError if a grasp is not usable or names a joint that is not in the
+    order, or a file cannot be written.
     """
     from surehold.store.atomic import checked_folder, write_file
 
@@ -76,9 +78,9 @@ def write_dexgraspbench_files(folder: str | Path, file: GraspFile, joints: Seque
             row[part] = np.array([*grasp.position, *grasp.orientation, *(values.get(name, 0.0) for name in joints)])
         content = io.BytesIO()
         np.save(content, np.array(row, dtype=object), allow_pickle=True)
-        written.append((grasp.name, content.getvalue()))
-    for name, content in written:
-        write_file(place / f"{_file_name(name)}.npy", content)
+        written.append(content.getvalue())
+    for name, content in zip(_file_names([grasp.name for grasp in checked.grasps]), written, strict=True):
+        write_file(place / f"{name}.npy", content)
 
 
 def read_dexgraspbench_grasps(path: str | Path, joints: Sequence[str] = ()) -> GraspFile:
@@ -145,8 +147,14 @@ def _grasp(file: Path, row: dict[str, Any], joints: Sequence[str]) -> StoredGras
     return checked_grasp(stored, place)
 
 
-def _file_name(name: str) -> str:
-    return "".join(c if c.isalnum() or c in "-_" else "_" for c in name)[:100] or "grasp"
+def _file_names(names: Sequence[str]) -> list[str]:
+    """Return a file's name for each grasp, no two the same."""
+    found: dict[str, None] = {}
+    for name in names:
+        plain = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)[:100] or "grasp"
+        numbered = (f"{plain}_{n}" for n in count(2))
+        found[next(free for free in chain([plain], numbered) if free not in found)] = None
+    return list(found)
 
 
 # -- dictionaries of a .npy file, without what a pickle may do ---------------------------------------------------------
