@@ -15,7 +15,7 @@ NO_CENTERS, NO_AXES = np.zeros((0, 6)), np.zeros((0, 6, 3))
 
 
 def expanded(wrenches, budget, gap=0.0):
-    return expand_nearest(wrenches, NO_CENTERS, NO_AXES, 1e-11, gap, 0.0, workspace(budget))
+    return expand_nearest(wrenches, NO_CENTERS, NO_AXES, 1e-11, gap, 0.0, False, workspace(budget))
 
 
 def sphere_points(rng, m):
@@ -80,12 +80,12 @@ def test_no_access_outside_the_arrays():
             w = np.random.default_rng(seed).normal(size=(40, 6))
             w /= np.linalg.norm(w, axis=1)[:, None]
             for budget in (64, 70, 128, 256):
-                assert expand_nearest(w, no_centers, no_axes, 1e-11, 0.0, 0.0, workspace(budget))[0] != FAILED
+                assert expand_nearest(w, no_centers, no_axes, 1e-11, 0.0, 0.0, False, workspace(budget))[0] != FAILED
         for c in range(4, 24):
             axes = np.random.default_rng(c).normal(size=(c, 6, 3)) * 0.3
             for near in (0.0, 1.0, 0.01):
                 corners = rim_points(w[:c], axes, 1)
-                assert expand_nearest(corners, w[:c], axes, 1e-11, 1e-9, near, workspace(256))[0] != FAILED
+                assert expand_nearest(corners, w[:c], axes, 1e-11, 1e-9, near, False, workspace(256))[0] != FAILED
     """
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(

@@ -25,7 +25,8 @@ ROUND_NEAR = 1e-4
 ROUND_GAP = 1e-9
 """Difference of the bounds at which round contacts count as measured without that, as a fraction of the largest wrench.
 
-Perfectly symmetric contacts around an axis, whose weakest directions form a continuum, end at about 1e-3.
+Perfectly symmetric contacts around an axis, whose weakest directions form a continuum, end at about 1e-3, soft fingers
+at up to 4e-2; the minimum is looked for then, too.
 """
 _CORNERS = 16  # round contacts of whose rims the first simplex is made, if they span one
 
@@ -50,14 +51,15 @@ def expand(wrenches, centers, axes, work):
     best = FAILED, 0.0, 0.0, 0.0, flat, 0, 0, tries
     for fallbacks in range(tries):
         tolerance = ROUND_TOLERANCES[fallbacks] if rounded else TOLERANCES[fallbacks]
-        result = expand_nearest(corners, centers, axes, tolerance, gap, near, work)
+        result = expand_nearest(corners, centers, axes, tolerance, gap, near, False, work)
         if result[0] == FLAT and stride > 1:
             stride = 1
             corners = rim_points(centers, axes, stride)
-            result = expand_nearest(corners, centers, axes, tolerance, gap, near, work)
+            result = expand_nearest(corners, centers, axes, tolerance, gap, near, False, work)
         for more in range(1 if rounded else 2):
             if result[0] == SPENT:
-                result = expand_nearest(corners, centers, axes, tolerance, gap, near, workspace(MORE_FACETS[more]))
+                room = workspace(MORE_FACETS[more])
+                result = expand_nearest(corners, centers, axes, tolerance, gap, near, rounded, room)
         status, lower, upper, u, expansions, facets = result
         epsilon = upper
         if status == SPENT and rounded:

@@ -22,6 +22,8 @@ harmless, whose wrenches are coplanar by the dozen and force Qhull to joggle the
 
 Round contacts have no facets: the bounds close in, ever more slowly. Once they are near each other, the contacts that
 the nearest facet touches are those that are active at a minimum of h, which Newton's method then finds to rounding.
+Where contacts are symmetric and minima form a continuum, the facets do not suffice for that, and it starts from
+thousands of them.
 
 s sees a facet if it lies above it by more than a tolerance. Not to see coplanar facets is the placing triangulation,
 which is consistent however degenerate the wrenches are.
@@ -49,18 +51,21 @@ SPENT = 3
 FAILED = 4
 """Rounding made the polytope inconsistent."""
 
+_STARTS = 4096  # of the nearest facets from which a minimum is sought where the facets did not suffice
+
 
 @njit(cache=True)
-def expand_nearest(wrenches, centers, axes, tolerance, gap, near, work):
+def expand_nearest(wrenches, centers, axes, tolerance, gap, near, last, work):
     """Expand the facet nearest to the origin until it is a facet of the hull.
 
     Arguments: wrenches (m, 6), 7 <= m < 65536; round contacts centers (c, 6) and axes (c, 6, 3), in whose hull the
     wrenches are, which then only span the first simplex; tolerance, below which distances count as zero, gap, the
     difference of the bounds at which to stop early (0 for none), and near, that at which round contacts are looked at
-    by Newton's method (0 for never), all as fractions of the largest wrench; the workspace, with room for all facets
-    that are made. Return (status, lower, upper, u, expansions, facets) with h(u) = upper, u (6,). For DONE and SPENT
-    lower <= epsilon <= upper (where lower is positive), and for FAILED too, before the step that failed; for OUTSIDE
-    upper < 0; for FLAT the bounds mean nothing.
+    by Newton's method (0 for never), all as fractions of the largest wrench; last, whether that is done however far
+    apart the bounds are once the facets are used up; the workspace, with room for all facets that are made. Return
+    (status, lower, upper, u, expansions, facets) with h(u) = upper, u (6,). For DONE and SPENT lower <= epsilon <=
+    upper (where lower is positive), and for FAILED too, before the step that failed; for OUTSIDE upper < 0; for FLAT
+    the bounds mean nothing.
     """
     m = len(wrenches)
     points = np.empty((m if len(centers) == 0 else m + len(work.vertices) // 16, 6))
@@ -107,12 +112,12 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, near, work):
             near *= 0.1
             for j in range(6):
                 u[j] = planes[nearest, j]
-            found = _minimum(u, h, vertices[nearest], planes[nearest], points, contacts, centers, axes)
+            found = _minimum(u, h, vertices[nearest], planes[nearest], points, contacts, centers, axes, False)
             if found <= upper + tolerance:
                 return DONE, lower, max(found, lower), u, expansions, n_facets
         if added == m:
             if m == len(points):
-                return SPENT, lower, upper, best, expansions, n_facets
+                break
             for j in range(6):
                 points[m, j] = s[j]
             contacts[m] = contact
@@ -124,7 +129,7 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, near, work):
         work.seen[0] = nearest
         n_seen, n_horizon = _see(s, tolerance, work, step)
         if n_facets + n_horizon > max_facets or 8 * n_horizon >= len(work.table):
-            return SPENT, lower, upper, best, expansions, n_facets
+            break
         expansions += 1
         if n_horizon < 6 or not _join(added, n_facets, n_horizon, work, step):
             return FAILED, lower, upper, best, expansions, n_facets
@@ -135,9 +140,27 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, near, work):
             heap_size += 1
         n_facets += n_horizon
 
+    if last and lower > 0.0:
+        found, some = upper + tolerance, False
+        for k in range(min(_STARTS, heap_size)):  # the first ones of a heap are near, too
+            facet = work.ids[k]
+            if mark[facet] < 0:
+                continue
+            for j in range(6):
+                u[j] = planes[facet, j]
+            h = support(u, points, 0, centers, axes, s)[2]
+            minimum = _minimum(u, h, vertices[facet], planes[facet], points, contacts, centers, axes, True)
+            if minimum < found:
+                found, some = minimum, True
+                for j in range(6):
+                    best[j] = u[j]
+        if some:
+            return DONE, lower, max(found, lower), best, expansions, n_facets
+    return SPENT, lower, upper, best, expansions, n_facets
+
 
 @njit(cache=True)
-def _minimum(u, h, corners, plane, points, contacts, centers, axes):
+def _minimum(u, h, corners, plane, points, contacts, centers, axes, damped):
     """Return the minimum of h near u (6,), which is moved there, or infinity if none is found.
 
     Active are the round contacts of the facet's corners, with the barycentric weights of its point nearest to the
@@ -163,7 +186,7 @@ def _minimum(u, h, corners, plane, points, contacts, centers, axes):
             active[n] = contact
             n += 1
         shares[i] += weights[k]
-    if not weakest_direction(centers, axes, active, shares, n, u, h):
+    if not weakest_direction(centers, axes, active, shares, n, u, h, damped):
         return np.inf
     return support(u, points, 0, centers, axes, np.empty(6))[2]
 
