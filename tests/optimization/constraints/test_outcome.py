@@ -56,7 +56,9 @@ def test_an_interval_that_is_turned_over_is_unlikely_but_finite():
 
 
 def test_interval_keeps_its_digits_in_the_upper_tail():
-    assert interval(np.array([9.0]), np.array([10.0]))[0] == pytest.approx(norm.sf(9.0) - norm.sf(10.0), rel=1e-12)
+    assert interval(np.array([9.0]), np.array([10.0]))[0] == pytest.approx(
+        norm.sf(9.0) - norm.sf(10.0), rel=1e-12, abs=0.0
+    )
 
 
 @pytest.mark.parametrize("limit", [Limit("c", -np.inf, 1.5), Limit("c", 1.0, np.inf), Limit("c", 0.8, 2.0)])
