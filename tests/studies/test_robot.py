@@ -338,6 +338,19 @@ def test_a_worker_that_says_that_it_lives_keeps_its_trial(robot):
     assert robot.ask("three").id == asked.id
 
 
+def test_a_lifetime_begins_when_the_trial_is_handed_out(robot, monkeypatch):
+    suggest, seconds = robot.sampler.suggest, [time.time()]
+
+    def slow(*arguments):
+        seconds[0] += 100.0  # by the clock, which the model, or others that hold the lock, let run
+        return suggest(*arguments)
+
+    monkeypatch.setattr(robot.sampler, "suggest", slow)
+    monkeypatch.setattr("surehold.studies.ledger.time.time", lambda: seconds[0])
+    assert robot.ask("one", lifetime=60.0).id == 0
+    assert robot.ask("two", lifetime=60.0).id == 1
+
+
 def test_a_trial_that_kills_every_worker_fails(robot):
     for _ in range(5):
         assert robot.ask(lifetime=0.0).id == 0

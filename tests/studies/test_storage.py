@@ -5,6 +5,8 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor, wait
+from pathlib import Path
+from threading import Thread
 
 import optuna
 import pytest
@@ -362,3 +364,36 @@ def test_a_creation_that_was_cut_off_is_made_again(url, monkeypatch):
     robot.close()
     with pytest.raises(InputError, match=r"exists in .*; use it, or choose another name"):
         RobotStudy.create("mug", SETTINGS, url)
+
+
+@pytest.mark.parametrize("file", ["study.log", "sqlite:///study.db"])
+def test_a_link_shares_the_locks_of_its_file(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    study = RobotStudy.create("rig", SETTINGS, file)
+    name = file.rpartition("/")[2]
+    Path("link").symlink_to(name)
+    linked = RobotStudy.open("rig", file.replace(name, "link"))
+    asked = []
+    with study.storage.handing_out():
+        other = Thread(target=lambda: asked.append(linked.ask()))
+        other.start()
+        other.join(0.3)
+        assert asked == []  # it waits, or both would be given the same trial
+    other.join(60)
+    assert study.ask().id == asked[0].id + 1
+    study.close()
+    linked.close()
+
+
+@pytest.mark.parametrize("file", ["study.log", "sqlite:///study.db"])
+def test_a_study_is_found_when_its_program_has_gone_to_another_folder(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    study = RobotStudy.create("rig", SETTINGS, file)
+    assert study.storage.shown == file
+    first = study.ask()
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir("elsewhere")
+    study.tell(first.id, 0.5)
+    assert study.ask().id == 1
+    assert not list(Path().iterdir())
+    study.close()

@@ -85,6 +85,39 @@ def test_interrupting_lets_the_trial_go(study):
     assert study.ask("other", lifetime=60.0).id == 0
 
 
+def test_a_trial_that_was_let_go_often_has_ended_nobody(study):
+    def interrupted(x):
+        raise KeyboardInterrupt
+
+    for _ in range(7):
+        with pytest.raises(KeyboardInterrupt):
+            work(study, attempt(interrupted))
+        time.sleep(0.01)
+    (trial,) = study.trials()
+    assert trial.state == TrialState.RUNNING
+    assert study.ask("other").id == 0
+
+
+def test_interrupting_while_the_storage_is_away_lets_the_trial_go(study, monkeypatch):
+    away = []
+
+    def fails(*arguments, **named):
+        away.append(arguments)
+        raise StorageFailure("away")
+
+    def interrupted(seconds):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study, "tell", fails)
+    monkeypatch.setattr("surehold.studies.worker.time.sleep", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        work(study, attempt(lambda x: x[0]))
+    monkeypatch.undo()
+    time.sleep(0.01)
+    assert len(away) == 1
+    assert study.ask("other", lifetime=60.0).id == 0
+
+
 def test_a_slow_trial_is_kept_by_signs_of_life(study):
     others = []
 

@@ -63,7 +63,12 @@ class Holder(NamedTuple):
     until: float | None
     """seconds since 1970 until which the holder counts as alive; None: forever"""
     attempts: int
-    """times that the trial was handed out"""
+    """times that the trial was handed out, but for those after which it was let go"""
+
+    @classmethod
+    def from_now(cls, name: str | None, lifetime: float | None, attempts: int = 1) -> "Holder":
+        """Return a holder who counts as alive for so many seconds, None forever, from this moment on."""
+        return cls(name or "", None if lifetime is None else time.time() + lifetime, attempts)
 
 
 @dataclass(frozen=True)
@@ -120,11 +125,15 @@ class Ledger:
             self._backend.set_trial_user_attr(trial._trial_id, HOLDER, holder)
 
     def renew(self, id: int, name: str, lifetime: float) -> None:
-        """Store that the holder of that name is alive for `lifetime` more seconds, where it still holds the trial."""
+        """Store that the holder of that name is alive for `lifetime` more seconds, where it still holds the trial.
+
+        With 0 it has let the trial go, which was not what ended it: this attempt does not count.
+        """
         trial = self.trial(id)
         holder = holder_of(trial)
         if trial.state == TrialState.RUNNING and holder is not None and holder.name == name:
-            self.hold(trial, holder._replace(until=time.time() + lifetime))
+            attempts = holder.attempts if lifetime else max(holder.attempts - 1, 0)
+            self.hold(trial, Holder.from_now(name, lifetime, attempts))
 
     def held(self, trials: list[FrozenTrial], name: str | None) -> FrozenTrial | None:
         """Return the running trial that the holder of that name has, if any."""

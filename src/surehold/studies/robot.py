@@ -82,9 +82,8 @@ class RobotStudy(OpenedStudy):
         NothingToAsk
             If the study is paused or has stopped. Trials of dead workers are handed out even after it has stopped.
         """
-        now = time.time()
-        until = None if lifetime is None else now + lifetime
         with self.storage.failures(), self.storage.handing_out():
+            now = time.time()  # not before the lock, which others may have held for as long as a worker lives
             self._refuse_paused()
             with self.storage.answering():
                 trials = self._ledger.trials()
@@ -92,18 +91,19 @@ class RobotStudy(OpenedStudy):
                 if trial is not None:
                     before = holder_of(trial)
                     attempts = 1 if before is None else before.attempts + 1
-                    self._ledger.hold(trial, Holder(worker or "", until, attempts))
+                    self._ledger.hold(trial, Holder.from_now(worker, lifetime, attempts))
                     return self._asked(trial, True)
             promise = self._refuse_stopped(trials, now)
-            holder = Holder(worker or "", until, 1)
             if any(t.state == TrialState.WAITING for t in trials):  # enqueued by Optuna's means
                 with self.storage.answering():  # or a veto of it may be lost
                     trial = self._ledger.trial(self.study.ask(self.settings.space.distributions).number)
-                    self._ledger.hold(trial, holder)
+                    self._ledger.hold(trial, Holder.from_now(worker, lifetime))
             else:
                 found = None if prepared is None else prepared(trials)
                 parameters, behind = found or (self._suggested(trials), 0)
-                marks = {HOLDER: holder} | ({} if promise is None else {PROMISE: promise})
+                marks: dict[str, Any] = {HOLDER: Holder.from_now(worker, lifetime)} | (
+                    {} if promise is None else {PROMISE: promise}
+                )
                 marks |= {BEHIND: behind} if behind else {}
                 trial = self._ledger.store(TrialState.RUNNING, parameters, marks)
             return self._asked(trial, False)

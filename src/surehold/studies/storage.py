@@ -193,14 +193,15 @@ def _journal(path: Path, name: str, create: bool) -> Storage:
     except OSError as error:
         raise InputError(f"storage {str(path)!r} cannot be written: {error.strerror or error}.") from None
     try:
-        backend = JournalStorage(Journal(path))
+        place = path.resolve()  # the locks stand there, by whatever link it is opened and wherever a function goes
+        backend = JournalStorage(Journal(place))
     except OSError as error:
         raise InputError(f"storage {str(path)!r} cannot be used: {error.strerror or error}.") from None
     except (ValueError, OverflowError, KeyError, AssertionError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"storage {str(path)!r} cannot be read: no journal, damaged, or of a newer version of Optuna ({error})."
         ) from None
-    return Storage(backend, str(path), name, path)
+    return Storage(backend, str(path), name, place)
 
 
 # --- databases ----------------------------------------------------------------------------------------------------
@@ -224,15 +225,17 @@ def _sqlite(url: str, name: str, create: bool) -> Storage:
     path = Path(file)
     if not path.exists() and not create:
         raise _missing(url, path)
-    lock = path.with_name(path.name + _TELLING)
     try:
-        writable = _check_writable(path, create) and _check_writable(lock, create)
+        writable = _check_writable(path, create)
+        place = path.resolve()
+        lock = place.with_name(place.name + _TELLING)
+        writable = writable and _check_writable(lock, create)
     except OSError as error:
         raise InputError(f"storage {url!r} cannot be written: {error.strerror or error}.") from None
     arguments: dict[str, Any] = {} if "timeout" in make_url(url).query else {"timeout": _SQLITE_PATIENCE}
     alone = StudyLock("", lock).held() if writable else nullcontext()
     storage, engine = _database(url if writable else _read_only(path), url, {"connect_args": arguments}, alone)
-    return Storage(storage, url, name, path, engine)
+    return Storage(storage, url, name, place, engine)
 
 
 def _read_only(path: Path) -> str:

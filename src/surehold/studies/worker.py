@@ -109,8 +109,7 @@ def work(
         waiting = False
         before(asked)
         with _alive(study, asked.id, name, lifetime):
-            outcome = attempt(asked.parameters)
-        outcome = _tell(study, asked.id, outcome)
+            outcome = _tell(study, asked.id, attempt(asked.parameters))
         made += 1
         after(asked, outcome)
     return made
@@ -181,7 +180,10 @@ def _alive(study: RobotStudy, id: int, name: str, lifetime: float) -> Iterator[N
     except KeyboardInterrupt:
         over.set()
         thread.join()
-        study.renew(id, name, 0.0)
+        try:
+            study.renew(id, name, 0.0)
+        except InputError as error:
+            _log.warning(f"trial {id} could not be let go; others take it up when this worker is dead: {error}")
         raise
     finally:
         over.set()
