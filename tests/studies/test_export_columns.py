@@ -1,7 +1,9 @@
-"""Names of parameters that are columns of the export."""
+"""The export of a study: names of parameters that are its columns, values that are none."""
 
 import csv
 import io
+import json
+import math
 
 import pytest
 
@@ -10,7 +12,7 @@ from surehold.studies import opened
 from surehold.studies.robot import RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
-from surehold.studies.status import rows, to_csv
+from surehold.studies.status import rows, status, to_csv, to_json
 
 
 def described(*names, **optimizer):
@@ -49,3 +51,15 @@ def test_an_older_study_with_such_names_opens_and_exports_its_results(tmp_path, 
     assert row["parameter_parameter_value"] == asked.parameters["value"]
     assert row["parameter_reached_x"] == asked.parameters["reached_x"]
     assert row["parameter_value"] == asked.parameters["parameter_value"]
+
+
+def test_values_that_optuna_takes_and_no_model_does_are_failures(tmp_path):
+    study = RobotStudy.create("mug", described("x"), str(tmp_path / "j.log"))
+    for value in (0.5, math.inf, -math.inf):
+        study.study.tell(study.study.ask(study.settings.space.distributions), value)
+    shown = status(study)
+    assert (shown["complete"], shown["failed"], shown["best_value"], shown["best_trial"]) == (1, 2, 0.5, 0)
+    assert shown == json.loads(json.dumps(shown, allow_nan=False))
+    exported = [(row["state"], row["value"]) for row in json.loads(to_json(study))["trials"]]
+    assert exported == [("complete", 0.5), ("failed", None), ("failed", None)]
+    assert study.recommend(write=False).n == 1  # as the model has it

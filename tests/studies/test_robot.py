@@ -164,6 +164,8 @@ def test_what_was_reached_is_what_the_model_learns_from(robot):
         ({"value": 1.0, "reached": {"dx": 1e300}}, "can be reached"),
         ({"value": 1.0, "reached": {"dx": math.nan}}, "finite"),
         ({"value": 1.0, "reached": {"dz": 0.0}}, "'dz' is unknown"),
+        ({"value": np.complex128(1.0 + 2.0j)}, "one finite number"),
+        ({"value": np.array(1.0 + 0.0j)}, "one finite number"),
         ({"value": 1.0, "id": 1}, "trial 1 is not in study 'mug'; the last one is 0"),
         ({"value": 1.0, "id": -1}, "0 or more"),
         ({"value": 1.0, "id": "0"}, "whole number"),

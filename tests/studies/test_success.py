@@ -1,5 +1,6 @@
 """A study whose trials succeed or fail."""
 
+import numpy as np
 import pytest
 
 from surehold import Box, Optimizer
@@ -34,10 +35,18 @@ def test_what_is_told_must_be_success_or_failure(tmp_path):
     assert study.tell(asked.id, "failure").value == 0.0
 
 
+@pytest.mark.parametrize("told", [np.float64(0.7) > 0.5, np.int64(1), np.float32(1.0), True])
+def test_what_numpy_says_of_success_is_taken(told, tmp_path):
+    study = created(tmp_path, outcome="success")
+    assert study.tell(study.ask().id, told).value == 1.0
+
+
 def test_a_study_of_values_takes_no_success(tmp_path):
     study = created(tmp_path)
     with pytest.raises(InputError, match="--outcome success"):
         study.tell(study.ask().id, "success")
+    with pytest.raises(InputError, match="'True' was told, but this study is told values"):
+        study.tell(0, np.float64(0.7) > 0.5)
 
 
 def hill(x):

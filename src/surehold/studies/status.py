@@ -8,6 +8,7 @@ from typing import Any
 
 from optuna.trial import FrozenTrial, TrialState
 
+from surehold.optimization.values import LARGEST
 from surehold.store.csv_cells import written_cell
 from surehold.studies.export_columns import columns_of
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
@@ -30,7 +31,7 @@ def status(study: RobotStudy) -> dict[str, Any]:
     trials = study.trials()
     now = time.time()
     paused, stopped = study.paused, study.stopped()
-    values = [t.values[0] for t in trials if t.state == TrialState.COMPLETE and t.values]
+    values = [value for t in trials if (value := _value(t)) is not None]
     best = (max if study.settings.direction == "maximize" else min)(values, default=None)
     return {
         "name": study.name,
@@ -41,7 +42,7 @@ def status(study: RobotStudy) -> dict[str, Any]:
         **{name: sum(_state(t, now) == name for t in trials) for name in _STATES.values()},
         "direction": study.settings.direction,
         "best_value": best,
-        "best_trial": next((t.number for t in trials if t.values and t.values[0] == best), None),
+        "best_trial": next((t.number for t in trials if best is not None and _value(t) == best), None),
         "parameters": study.settings.to_json()["parameters"],
         "units": dict(study.settings.units),
         "input_noise": study.settings.to_json()["input_noise"],
@@ -65,7 +66,7 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
             {
                 "id": trial.number,
                 "state": "vetoed" if _vetoed(trial) else _state(trial, now),
-                "value": trial.values[0] if trial.state == TrialState.COMPLETE and trial.values else None,
+                "value": _value(trial),
                 **({"of": trial.user_attrs.get(EXECUTIONS, 1)} if "of" in columns.outcome else {}),
                 **{column: outputs.get(name) for name, column in columns.outputs.items()},
                 **{column: parameters.get(name) for name, column in columns.parameters.items()},
@@ -99,8 +100,16 @@ def to_json(study: RobotStudy) -> str:
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
+def _value(trial: FrozenTrial) -> float | None:
+    """Return the value of a complete trial; None where Optuna took one that no model can be made of, such as inf."""
+    value = trial.values[0] if trial.state == TrialState.COMPLETE and trial.values else None
+    return value if value is not None and abs(value) <= LARGEST else None
+
+
 def _state(trial: FrozenTrial, now: float) -> str:
     """Return the state of a trial; of one that will be handed out again "waiting", as `tell` says."""
+    if trial.state == TrialState.COMPLETE and _value(trial) is None:  # for the model, too
+        return _STATES[TrialState.FAIL]
     return "waiting" if waits(trial, now) else _STATES[trial.state]
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+import numpy as np
+
 from surehold.errors import InputError
 from surehold.optimization.success import counted
 
@@ -22,6 +24,8 @@ def answer(
         If the study is about success and something else was told, or the other way round; if successes come with a
         value, or are no count.
     """
+    if isinstance(value, np.generic):  # what comparing or counting with NumPy gives
+        value = value.item()
     if optimizer.get("outcome", "value") != "success":
         if successes is not None or of is not None:
             said = f"{successes} successes of {of} were"
