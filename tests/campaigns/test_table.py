@@ -83,6 +83,34 @@ def test_other_settings_and_other_plans_are_refused(tmp_path, cheap):
         pass
 
 
+def test_shares_of_one_plan_with_different_settings_are_not_averaged(tmp_path, cheap):
+    hill = replace(cheap.problems["hill"], input_noise=0.02)
+    changed = replace(cheap, problems={**cheap.problems, "hill": hill})
+    for k, plan in enumerate((cheap, changed), start=1):
+        with opened(tmp_path / str(k), plan, (k, 2)) as table:
+            for task in plan.tasks(shard=(k, 2)):
+                table.append(row_of(*task))
+        name = f"table-{k}-of-2.jsonl"
+        (tmp_path / str(k) / name).rename(tmp_path / name)  # as shares of two machines are brought together
+    with pytest.raises(InputError, match=r"1-of-2.*2-of-2.*runs of BO on hill with different settings"):
+        read_folder(tmp_path)
+    tables = sorted(tmp_path.glob("table-*.jsonl"))
+    with pytest.raises(InputError, match="different settings"):
+        pack(tables, tmp_path / "packed")
+    with pytest.raises(InputError, match="different settings"), opened(tmp_path, cheap):
+        pass
+
+
+def test_rows_go_to_their_table_when_a_run_has_gone_to_another_folder(tmp_path, cheap, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "elsewhere").mkdir()
+    with opened("runs", cheap) as table:
+        monkeypatch.chdir("elsewhere")
+        table.append(row_of(*cheap.tasks()[0]))
+        table.sort(cheap)
+    assert len(read_folder(tmp_path / "runs").rows) == 1
+
+
 def test_more_runs_and_more_methods_are_welcome(tmp_path, cheap):
     fill(tmp_path, cheap, cheap.tasks()[:2])
     grown = replace(cheap, runs=9, methods={**cheap.methods, "third": cheap.methods["BO"]})

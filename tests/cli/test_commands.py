@@ -58,6 +58,11 @@ def near_the_edge(x):
 def stopped_at_once(x):
     os.kill(os.getpid(), signal.SIGINT)
     return 0.0
+
+def wanders(x):
+    os.makedirs("work", exist_ok=True)
+    os.chdir("work")
+    return -x[0]
 """
 
 
@@ -290,6 +295,13 @@ def test_another_run_gets_another_folder(here, capsys):
     assert (here / "runs" / "hill-bo-seed0" / "result.json").read_bytes() == before
     assert (here / "runs" / "hill-bo-seed0-2" / "result.json").read_bytes() != before
     assert (here / "runs" / "hill-bo-seed0-3" / "result.json").read_bytes() == before
+
+
+def test_a_function_that_goes_to_another_folder_takes_no_files_along(here, capsys):
+    assert surehold("maximize own.py:wanders --bounds a=0:1 --trials 4 --initial 4 --method bo --noise none") == 0
+    assert "Report: runs/wanders-bo-seed0/report.html" in capsys.readouterr().out
+    written = {path.parent for path in here.rglob("r*.*") if path.name in ("report.html", "result.json")}
+    assert written == {here / "runs" / "wanders-bo-seed0"}
 
 
 def test_a_run_that_gave_nothing_leaves_no_empty_folder(here, capsys):

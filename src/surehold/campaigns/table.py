@@ -26,6 +26,7 @@ FORMAT: Final = "surehold campaign 1"
 PACKED: Final = "table.jsonl.gz"
 
 Key = tuple[str, str, int]
+Settings = dict[tuple[str, str], tuple[str, str | Path]]  # digest of a cell, and the table that has it
 
 
 @dataclass
@@ -156,7 +157,7 @@ def opened(folder: str | Path, plan: Plan, shard: tuple[int, int] = (1, 1)) -> I
         first, _, rows = path.read_bytes().partition(b"\n")
         if first + b"\n" != _line(header):  # a plan that has grown: its page shows it although the run is interrupted
             write_file(path, _line(header) + rows)
-        yield Table(path, records)
+        yield Table(path.absolute(), records)  # a function may go to another folder
 
 
 def read_folder(folder: str | Path) -> Records:
@@ -165,7 +166,7 @@ def read_folder(folder: str | Path) -> Records:
     Raises
     ------
     InputError
-        If there is none, one has another format, or two belong to different plans.
+        If there is none, one has another format, or two belong to different plans or settings.
     """
     place = Path(folder)
     paths = [place] if place.is_file() else sorted(place.glob("table*.jsonl*"))
@@ -175,6 +176,7 @@ def read_folder(folder: str | Path) -> Records:
         )
     notes: list[str] = []
     records: Records | None = None
+    settings = Settings()
     for path in paths:
         header, rows = _read(path, notes)
         if records is None:
@@ -185,7 +187,7 @@ def read_folder(folder: str | Path) -> Records:
                 "give each plan a folder of its own."
             )
         for row in rows:
-            _take_in(row, records.rows)
+            _take_in(row, records.rows, settings, path)
     assert records is not None
     return records
 
@@ -196,14 +198,17 @@ def pack(folders: Sequence[str | Path], target: str | Path) -> Path:
     Of runs that several folders hold, the first that finished are kept, of those that failed in all the last; the
     target's own plain tables become part of it.
     """
-    first, *others = [read_folder(folder) for folder in folders]
-    for other in others:
-        if other.header["plan"] != first.header["plan"]:
-            raise InputError(f"plans '{first.header['plan']}' and '{other.header['plan']}' do not go into one table.")
-        for row in other.rows.values():
-            _take_in(row, first.rows)
-    rows = sorted(first.rows.values(), key=lambda row: (row["seed"], row["problem"], row["method"]))
-    raw = b"".join([_line(first.header), *map(_line, rows)])
+    taken, settings = dict[Key, dict[str, Any]](), Settings()
+    header: dict[str, Any] = {}
+    for folder in folders:
+        records = read_folder(folder)
+        header = header or records.header
+        if records.header["plan"] != header["plan"]:
+            raise InputError(f"plans '{header['plan']}' and '{records.header['plan']}' do not go into one table.")
+        for row in records.rows.values():
+            _take_in(row, taken, settings, folder)
+    rows = sorted(taken.values(), key=lambda row: (row["seed"], row["problem"], row["method"]))
+    raw = b"".join([_line(header), *map(_line, rows)])
     place = checked_folder(target)
     write_file(place / PACKED, gzip.compress(raw, 9, mtime=0))
     if place in [Path(folder) for folder in folders]:
@@ -294,11 +299,16 @@ def _line(row: Mapping[str, Any]) -> bytes:
     return json.dumps(row, separators=(",", ":"), allow_nan=False, default=list).encode() + b"\n"
 
 
-def _take_in(row: dict[str, Any], rows: dict[Key, dict[str, Any]]) -> None:
-    """Add a row to those of other tables; it takes the place of one that failed."""
-    known = rows.get(_key(row))
+def _take_in(row: dict[str, Any], rows: dict[Key, dict[str, Any]], settings: Settings, place: str | Path) -> None:
+    """Add a row to those of other tables, in the place of one that failed; all of a cell have the same settings."""
+    problem, method, _ = key = _key(row)
+    digest, where = settings.setdefault((problem, method), (row["digest"], place))
+    if row["digest"] != digest:
+        tables = f"'{place}' holds" if where == place else f"'{where}' and '{place}' hold"
+        raise InputError(f"{tables} runs of {method} on {problem} with different settings; keep those of one.")
+    known = rows.get(key)
     if known is None or known["status"] == "failed":
-        rows[_key(row)] = row
+        rows[key] = row
 
 
 def _key(row: Mapping[str, Any]) -> Key:

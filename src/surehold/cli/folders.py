@@ -25,10 +25,11 @@ def folder_of(out: str, name: str) -> Path:
 @contextmanager
 def removed_on_error(folder: Path) -> Iterator[None]:
     """Remove a command's folder in runs/ where the block fails before anything was written into it."""
+    place = folder.absolute()
     try:
         yield
     except BaseException:
         if folder.parent == Path("runs"):
             with suppress(OSError):  # it is not empty
-                folder.rmdir()
+                place.rmdir()
         raise

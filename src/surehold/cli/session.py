@@ -125,6 +125,7 @@ def run_session(
     """
     console = console or terminal()
     started = time.perf_counter()
+    place = folder.absolute()  # a function may go to another folder
     with terminable() as ended, removed_on_error(folder):
         for name, count, least in (("trials", trials, 1), ("initial", initial, 1), ("requeries", requeries, 0)):
             if count < least:
@@ -205,7 +206,7 @@ def run_session(
         with undisturbed(console):
             report = reported(dict.fromkeys(shown), unasked * bool(ended and requeries and noise is not None))
             if asked is not None:  # what follows may take as long as the trials did
-                files.write_result(report, folder)
+                files.write_result(report, place)
         scores: dict[tuple[str, int], RobustScore | None] = {}
         missing: list[str] = []
         if asked is not None:
@@ -213,10 +214,10 @@ def run_session(
         with undisturbed(console):
             if scores:
                 report = reported(scores, missing, report.surfaces)
-            with listed_writes(folder, replacing=True) as removed:
-                path = files.write_run(report, folder)
-                also_write(report, folder)
-    _show(report, path, time.perf_counter() - started, console)
+            with listed_writes(place, replacing=True) as removed:
+                path = files.write_run(report, place)
+                also_write(report, place)
+    _show(report, folder / path.name, time.perf_counter() - started, console)
     if removed:
         more = ", ..." * (len(removed) > 3)
         console.print(
