@@ -10,6 +10,7 @@ from surehold.errors import InputError
 from surehold.studies.robot import RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
+from surehold.studies.status import to_csv
 from surehold.studies.warm_start import import_trials, trials_of_csv, trials_of_study
 
 SPACE = SearchSpace({"dx": (-0.05, 0.05)})
@@ -143,3 +144,15 @@ def test_a_study_is_not_imported_into_itself(here, capsys, url, other):
     assert "has its own trials already" in capsys.readouterr().err
     assert len(study.trials()) == 1
     study.close()
+
+
+def test_names_that_a_spreadsheet_would_compute_are_quoted_in_the_header_and_read_again(here):
+    space = SearchSpace({"=dx": (-0.05, 0.05), "-dy": (0.0, 1.0)})
+    study = RobotStudy.create("sums", StudySettings(space), "sums.log")
+    study.add({"=dx": 0.01, "-dy": 0.5}, 0.7)
+    text = to_csv(study)
+    assert text.startswith("id,state,value,'=dx,'-dy,reached_=dx,")
+    (here / "sums.csv").write_text(text)
+    other = RobotStudy.create("other", StudySettings(space), "other.log")
+    import_trials(other, trials_of_csv("sums.csv", {name: name for name in space.distributions}))
+    assert [(trial.params, trial.value) for trial in other.trials()] == [({"=dx": 0.01, "-dy": 0.5}, 0.7)]

@@ -83,9 +83,10 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
 def to_csv(study: RobotStudy) -> str:
     """Return the trials as CSV with a header; an empty field is nothing, texts as in `csv_cells.written_cell`."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, columns_of(study.settings).all, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({column: written_cell(value) for column, value in row.items()} for row in rows(study))
+    columns = columns_of(study.settings).all
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(map(written_cell, columns))
+    writer.writerows([written_cell(row[column]) for column in columns] for row in rows(study))
     return text.getvalue()
 
 

@@ -100,7 +100,7 @@ def trials_of_csv(
     reader = csv.DictReader(io.StringIO(text, newline=""), strict=True)
     rows: list[tuple[int, dict[str, Any]]] = []
     try:
-        columns = list(reader.fieldnames or [])
+        reader.fieldnames = columns = [cell_text(column) for column in reader.fieldnames or []]
         for row in reader:
             rows.append((reader.line_num, row))
     except csv.Error as error:
