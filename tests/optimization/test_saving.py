@@ -186,3 +186,18 @@ def test_bad_files(tmp_path):
     with pytest.raises(InputError, match="cannot be written"):
         used(0).save(tmp_path / "no" / "folder.json")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.json", "good.json"]
+
+
+def test_a_save_that_is_cut_off_leaves_the_file_from_before_and_nothing_else(tmp_path, monkeypatch):
+    def cut_off(handle):
+        raise KeyboardInterrupt
+
+    optimizer = used(0)
+    optimizer.save(tmp_path / "run.json")
+    before = (tmp_path / "run.json").read_bytes()
+    optimizer.tell([0.5, 4.0], 0.7)
+    monkeypatch.setattr("os.fsync", cut_off)  # after which the content is on the disk, where the name may come earlier
+    with pytest.raises(KeyboardInterrupt):
+        optimizer.save(tmp_path / "run.json")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
+    assert (tmp_path / "run.json").read_bytes() == before

@@ -17,6 +17,7 @@ from surehold.optimization.known_coordinates import Fixed, fixed_of
 from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.trials import Trials
+from surehold.store.atomic import replacing
 
 __all__ = ["read", "write"]
 
@@ -66,12 +67,10 @@ def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], t
         ],
     }
     text = json.dumps(data, indent=1, allow_nan=False) + "\n"
-    unfinished = Path(f"{os.fspath(path)}.{os.getpid()}.part")
     try:
-        unfinished.write_text(text, encoding="utf-8")
-        unfinished.replace(path)
+        with replacing(Path(path)) as file:
+            file.write(text.encode("utf-8"))
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
         raise InputError(f"file {os.fspath(path)!r} cannot be written: {error.strerror or error}.") from None
 
 
