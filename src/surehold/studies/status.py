@@ -120,7 +120,7 @@ def _vetoed(trial: FrozenTrial) -> bool:
 
 def _pending(trial: FrozenTrial, now: float) -> dict[str, Any]:
     holder = holder_of(trial)
-    let_go = holder is not None and not holder.attempts  # nobody holds it who could be dead
+    let_go = holder is not None and not (holder.name or holder.attempts)  # nobody holds it who could be dead
     begun = trial.datetime_start
     return {
         "id": trial.number,
