@@ -254,3 +254,21 @@ def test_a_parameter_of_a_measure_that_is_not_named_is_refused(tmp_path, cheap):
     share = replace(cheap, methods={"worst share": MethodSetup(robust=True, settings={"alpha": 0.1})})
     with pytest.raises(InputError, match=r"alpha is 0\.1, but no risk is given"):
         run_campaign(share, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import os\nos.chdir('lab')\ndef f(x):\n    return -x[0]\n",
+        "import os\ndef f(x):\n    os.chdir('/')\n    return -x[0]\n",
+    ],
+    ids=["when it is loaded", "when it is called"],
+)
+def test_the_run_after_one_that_has_gone_to_another_folder_finds_its_function(tmp_path, cheap, monkeypatch, text):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "own.py").write_text(text)
+    own = replace(cheap, problems={"own": ProblemSetup("own.py:f", 6, 5, {"bounds": "x=0:1"}, 0.05)}, runs=2)
+    run_campaign(own, "out", only=["BO"])
+    rows = read_folder(tmp_path / "out").rows.values()  # refuses rows of different settings
+    assert [row["status"] for row in rows] == ["done", "done"]

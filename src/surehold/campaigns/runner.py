@@ -4,7 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, chdir, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
@@ -114,7 +114,8 @@ def run_campaign(
     cells = plan.cells(only)
     for label, on in {cell.problem: cell.on for cell in cells}.items():
         try:
-            build_problem(on)  # also leaves what is kept on disk, so that workers do not make it side by side
+            with chdir("."):  # the file of a function may go to another folder when it is loaded
+                build_problem(on)  # also leaves what is kept on disk, so that workers do not make it side by side
         except InputError as error:
             raise InputError(f"problem '{label}': {error}") from None
     for cell in cells:

@@ -7,6 +7,7 @@ same for long. Numbers have nine significant digits.
 import hashlib
 import platform
 from collections.abc import Sequence
+from contextlib import chdir
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -44,7 +45,7 @@ def run_once(cell: Cell, seed: int) -> dict[str, Any]:
     row: dict[str, Any] = {"problem": cell.problem, "method": cell.method, "seed": seed, "digest": cell.digest}
     started, cpu = perf_counter(), process_time()
     try:
-        with single_threaded():
+        with single_threaded(), chdir("."):  # a function may go to another folder, and the next run begins here
             row |= {"status": "done", **_Run(cell, seed).finish()}
     except Exception as error:
         raise_interruption(error)
