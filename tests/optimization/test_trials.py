@@ -294,5 +294,15 @@ def test_conditions_and_logarithms_may_be_far_away():
     optimizer = Optimizer(box, seed=0)
     optimizer.tell({"force": 1.0, "load": 0.5}, 0.3, reached={"force": 500.0, "load": 70.0})  # within two decades
     assert not optimizer.recommend().warning
-    with pytest.warns(UserWarning, match=r"reached force = 2000, .* 0\.1 to 10 "):
+    with pytest.warns(UserWarning, match=r"reached force = 2000, .* 0\.1 to 10 than that is wide in logarithms"):
         optimizer.tell({"force": 1.0, "load": 0.5}, 0.3, reached={"force": 2000.0, "load": 0.5})
+
+
+def test_what_was_reached_is_said_in_digits_that_tell_it_from_the_range():
+    """Also where it counts as a million box widths away."""
+    optimizer = Optimizer(Box({"x": (4512345.5, 4512346.5)}), seed=0)
+    with pytest.warns(UserWarning, match=r"x = 4512349\.25, farther from its range of 4512345\.5 to 4512346\.5 than"):
+        optimizer.tell([4512346.0], 0.2, reached=[4512349.25])
+    for reached, said in ((1e9, "5512345.5"), (-1e9, "3512345.5")):
+        with pytest.warns(UserWarning, match=rf"x = {said} or beyond, farther"):
+            optimizer.tell([4512346.0], 0.2, reached=[reached])

@@ -125,13 +125,16 @@ def astray_in_words(box: Box, U: NDArray[np.float64]) -> str:
     far = np.flatnonzero(np.any(beyond > _ASTRAY, axis=1))
     if not len(far):
         return ""
-    variable = number[int(np.argmax(beyond[far[0]]))]
+    column = int(np.argmax(beyond[far[0]]))
+    variable = number[column]
     value = box.as_given(box.from_unit(U[far[0]]))[variable.name]
+    more = " or beyond" * bool(beyond[far[0], column] >= _FARTHEST - 1.0)  # moved here by `trial_input`
     trials = f"{len(far)} of {amount(len(U), 'trial')} {'is' if len(far) == 1 else 'are'}"
     return (
-        f"{trials if len(U) > 1 else 'The trial is'} told to have reached "
-        f"{variable.name} = {value:.4g}, farther from its range of {variable.low:g} to {variable.high:g} than that is "
-        "wide: next to nothing is learnt of the box there. Check the unit of what is reached."
+        f"{trials if len(U) > 1 else 'The trial is'} told to have reached {variable.name} = {value:.12g}{more}, "
+        f"farther from its range of {variable.low:.12g} to {variable.high:.12g} than that is wide"
+        f"{' in logarithms' * variable.log}: next to nothing is learnt of the box there. "
+        "Check the unit of what is reached."
     )
 
 
