@@ -1,6 +1,7 @@
 """Former trials: each is taken once, failed ones are named, and a header that does not fit says what may be meant."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,17 @@ def test_a_trial_is_imported_once(here):
     found = trials_of_study(study.study, NAMES, "maximize")
     assert import_trials(other, found).failed == ["trial 2 failed"]
     assert len(import_trials(other, found).already) == len(study.trials()) == len(other.trials()) == 5
+
+
+def test_values_that_optuna_takes_and_no_model_does_are_imported_as_the_failures_that_they_are(here):
+    """Functions of Optuna say inf where they failed."""
+    before, study = created("before"), created("after")
+    for value in (0.7, math.inf, -math.inf, 1e301):
+        before.study.tell(before.study.ask(SPACE.distributions), value)
+    made = import_trials(study, trials_of_study(before.study, NAMES, "maximize"))
+    assert (made.values, made.failed) == (1, ["trial 1 failed", "trial 2 failed", "trial 3 failed"])
+    (here / "before.csv").write_text(to_csv(before))
+    assert len(import_trials(created("by-file"), trials_of_csv("before.csv", NAMES)).failed) == 3
 
 
 def test_what_was_imported_is_said(here, capsys):

@@ -1,7 +1,7 @@
 """What the stored trials of a study say to the optimizer, whoever wrote them.
 
     state in Optuna                     for the optimizer
-    COMPLETE, or PRUNED with a value    told; failed where the value is not finite
+    COMPLETE, or PRUNED with a value    told; failed where no model can be made of the value
     FAIL, or PRUNED without a value     failed: it counts as the lowest value told, so that it is avoided
     FAIL, and later retried             nothing: its worker died, and the retried trial stands for it
     RUNNING                             pending, once its parameters are known
@@ -11,7 +11,6 @@ Trials outside of the search space (other parameters, other ranges) are left out
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from math import isfinite
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -23,7 +22,17 @@ from surehold.optimization.success import MOST_EXECUTIONS
 from surehold.optimization.values import LARGEST, LARGEST_SQUARED
 from surehold.studies.search_space import SearchSpace
 
-__all__ = ["CONTACTS", "EXECUTIONS", "OUTPUTS", "REACHED", "History", "Reader", "history_of", "parameters_of"]
+__all__ = [
+    "CONTACTS",
+    "EXECUTIONS",
+    "OUTPUTS",
+    "REACHED",
+    "History",
+    "Reader",
+    "history_of",
+    "parameters_of",
+    "value_of",
+]
 
 #: Trial attribute that holds the parameters that were truly reached.
 REACHED: Final = "surehold:reached"
@@ -147,8 +156,7 @@ class _Told(NamedTuple):
 
 
 def _told(trial: FrozenTrial, parameters: Mapping[str, Any], space: SearchSpace, outputs: Sequence[str]) -> _Told:
-    value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else np.nan
-    value = value if abs(value) <= LARGEST else np.nan
+    value = value_of(trial)
     actual = {**parameters, **trial.user_attrs.get(REACHED, {})}
     attributes = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {}) if outputs else {}
     of = trial.user_attrs.get(EXECUTIONS, 1)
@@ -156,10 +164,16 @@ def _told(trial: FrozenTrial, parameters: Mapping[str, Any], space: SearchSpace,
         trial.number,
         parameters,
         actual if actual != parameters and space.encodes(actual) else parameters,
-        value,
+        np.nan if value is None else value,
         [_finite(attributes.get(name)) for name in outputs],
-        of if type(of) is int and 0 < of <= MOST_EXECUTIONS and isfinite(value) else 1,
+        of if type(of) is int and 0 < of <= MOST_EXECUTIONS and value is not None else 1,
     )
+
+
+def value_of(trial: FrozenTrial) -> float | None:
+    """Return the value of a trial; None where it has none, or Optuna took one that no model can be made of: inf."""
+    value = trial.values[0] if trial.state != TrialState.FAIL and trial.values else None
+    return value if value is not None and abs(value) <= LARGEST else None
 
 
 def _finite(value: Any) -> float:

@@ -8,10 +8,9 @@ from typing import Any
 
 from optuna.trial import FrozenTrial, TrialState
 
-from surehold.optimization.values import LARGEST
 from surehold.store.csv_cells import written_cell
 from surehold.studies.export_columns import columns_of
-from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
+from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of, value_of
 from surehold.studies.ledger import NOTE, VETOED, holder_of, waits
 from surehold.studies.robot import RobotStudy
 
@@ -102,9 +101,7 @@ def to_json(study: RobotStudy) -> str:
 
 
 def _value(trial: FrozenTrial) -> float | None:
-    """Return the value of a complete trial; None where Optuna took one that no model can be made of, such as inf."""
-    value = trial.values[0] if trial.state == TrialState.COMPLETE and trial.values else None
-    return value if value is not None and abs(value) <= LARGEST else None
+    return value_of(trial) if trial.state == TrialState.COMPLETE else None
 
 
 def _state(trial: FrozenTrial, now: float) -> str:

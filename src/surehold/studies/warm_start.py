@@ -18,7 +18,7 @@ from surehold.amounts import amount
 from surehold.errors import InputError
 from surehold.optimization.limits import checked_outputs
 from surehold.store.csv_cells import cell_text
-from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED
+from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, value_of
 from surehold.studies.ledger import NOTE, checked_value
 from surehold.studies.robot import RobotStudy
 from surehold.studies.settings import SETTINGS
@@ -169,8 +169,8 @@ def trials_of_study(
 ) -> list[FormerTrial]:
     """Return the finished trials of a study of Optuna; `names` are {parameter: its name there}.
 
-    Values of a study of the other direction change their sign. Trials that lack a parameter are refused by
-    `import_trials`.
+    Values of a study of the other direction change their sign; those of which no model can be made, such as inf, are
+    failures. Trials that lack a parameter are refused by `import_trials`.
     """
     if len(study.directions) != 1:
         raise InputError(f"study '{study.study_name}' has {len(study.directions)} objectives; one is needed.")
@@ -178,17 +178,17 @@ def trials_of_study(
     watched = study.user_attrs.get(SETTINGS, {}).get("optimizer", {}).get("constraints") or {}
     found = []
     for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.PRUNED, TrialState.FAIL)):
-        failed = trial.state == TrialState.FAIL or not trial.values
+        value = value_of(trial)
+        failed = value is None
         stored = trial.user_attrs.get(REACHED, {})
         parameters = {name: trial.params[there] for name, there in names.items() if there in trial.params}
         reached = {name: stored[there] for name, there in names.items() if there in stored}
-        value = None if failed else sign * trial.values[0]
         where = f"{study.study_name}, trial {trial.number}"
         of = None if failed else trial.user_attrs.get(EXECUTIONS)
         told = trial.user_attrs | trial.user_attrs.get(OUTPUTS, {})
         kept = {name: told.get(name) for name in outputs if name in told or name in watched}
         why = "failed" if failed else ""
-        found.append(FormerTrial(where, parameters, value, failed, reached, of, kept, why))
+        found.append(FormerTrial(where, parameters, None if failed else sign * value, failed, reached, of, kept, why))
     return found
 
 
