@@ -280,6 +280,7 @@ def test_restored_with_trials_outside():
 def test_a_reached_input_of_another_unit_is_said():
     optimizer = Optimizer(BOX, seed=0, n_initial=3, **in_both(True))
     optimizer.tell(optimizer.ask(), 0.2, reached=[0.09, 0.03])  # out of the box, and no farther than it is wide
+    optimizer.tell(optimizer.ask(), failed="rig", reached=[0.01, 12.0])  # nothing is learnt of it, and nothing said
     assert not optimizer.recommend().warning
     with pytest.warns(UserWarning, match=r"The trial is told to have reached dy = 12, .* -0\.03 to 0\.03") as told:
         optimizer.tell(optimizer.ask(), 0.4, reached=[0.01, 12.0])  # dy in millimeters
