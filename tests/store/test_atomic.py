@@ -59,6 +59,22 @@ def test_a_failed_write_keeps_what_was_there(tmp_path):
         write_file(tmp_path / "missing" / "x", "new")
 
 
+def test_what_is_no_ordinary_file_stays(tmp_path):
+    """A program of root that saves to /dev/stdout would take it from all others."""
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="it is no ordinary file"):
+        write_file(tmp_path / "pipe", "x")
+    assert (tmp_path / "pipe").is_fifo()
+    for name, end in (("link", "data"), ("dangling", "missing"), ("device", "pipe")):
+        (tmp_path / name).symlink_to(end)
+    with pytest.raises(InputError, match="it is no ordinary file"):
+        write_file(tmp_path / "device", "x")
+    for name in ("link", "dangling"):
+        write_file(tmp_path / name, name)
+        assert (tmp_path / name).is_symlink()
+    assert [(tmp_path / name).read_text() for name in ("data", "missing")] == ["link", "dangling"]
+
+
 def test_a_folder_is_made_or_refused(tmp_path):
     assert checked_folder(tmp_path / "a" / "b").is_dir()
     (tmp_path / "taken").write_text("a file")

@@ -1,5 +1,6 @@
 """Files that are written whole or not at all, whoever reads or writes them at the same time."""
 
+import errno
 import hashlib
 import itertools
 import os
@@ -30,7 +31,13 @@ def noted_writes() -> Iterator[dict[Path, str]]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that takes the place of `path` when the block ends; after an error what was there before stays."""
+    """Open a file that takes the place of `path` when the block ends; after an error what was there before stays.
+
+    Of a link it is what the link leads to. Raises OSError for a device or a pipe: to be replaced would end it for all.
+    """
+    path = Path(os.path.realpath(path))
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.EINVAL, "it is no ordinary file")
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
