@@ -17,7 +17,7 @@ from surehold.optimization.known_coordinates import Fixed, fixed_of
 from surehold.optimization.limits import limits_of
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.trials import Trials
-from surehold.store.atomic import replacing
+from surehold.store.atomic import write_file
 
 __all__ = ["read", "write"]
 
@@ -66,12 +66,7 @@ def write(path: str | os.PathLike[str], box: Box, settings: Mapping[str, Any], t
             for number, u in zip(trials.pending_numbers, trials.pending, strict=True)
         ],
     }
-    text = json.dumps(data, indent=1, allow_nan=False) + "\n"
-    try:
-        with replacing(Path(path)) as file:
-            file.write(text.encode("utf-8"))
-    except OSError as error:
-        raise InputError(f"file {os.fspath(path)!r} cannot be written: {error.strerror or error}.") from None
+    write_file(Path(path), json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
 def read(path: str | os.PathLike[str], given: Mapping[str, Any]) -> tuple[Box, dict[str, Any], Trials]:
