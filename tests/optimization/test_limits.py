@@ -31,7 +31,9 @@ def test_a_limit_as_text(text, expected):
     assert parsed_limit(text) == expected
 
 
-@pytest.mark.parametrize("text", ["", "3", "a<=b", "1<=a>=0", "a<=", "1<=2", "a<=1<=b"])
+@pytest.mark.parametrize(
+    "text", ["", "3", "a<=b", "1<=a>=0", "a<=", "1<=2", "a<=1<=b", "a=3", "a==3", "a=<3", "a=>3", "a≤3"]
+)
 def test_a_text_that_is_no_limit(text):
     with pytest.raises(InputError, match="not understood"):
         parsed_limit(text)

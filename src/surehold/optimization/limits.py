@@ -80,9 +80,10 @@ def parsed_limit(text: str) -> tuple[str, tuple[float | None, float | None]]:
     sides, signs = parts[::2], {sign[0] for sign in parts[1::2]}
     named = [i for i, side in enumerate(sides) if not _is_number(side)]
     middle = {1: [0], 2: [0, 1], 3: [1]}.get(len(sides), [])
-    if len(signs) > 1 or len(named) != 1 or named[0] not in middle or not sides[named[0]]:
+    name = sides[named[0]] if len(named) == 1 and named[0] in middle else ""
+    if len(signs) > 1 or not name or any(sign in name for sign in "=≤≥"):  # "torque=<3" would name an output "torque="
         raise InputError(f"constraint {text!r} is not understood; write 'torque<=3', '1<=torque<=3' or 'torque>=1'.")
-    name, numbers = sides[named[0]], [float(side) for i, side in enumerate(sides) if i != named[0]]
+    numbers = [float(side) for i, side in enumerate(sides) if i != named[0]]
     if len(sides) == 1:
         return name, (None, None)
     if len(sides) == 3:
