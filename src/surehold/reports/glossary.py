@@ -20,7 +20,15 @@ _QUALITIES: Final = {
     "simox": "Epsilon relative to that of forces everywhere on the object, as the simulator of the thesis has it.",
     "task": "The largest share of the task's pushes, by default gravity from all sides, that the contacts resist.",
     "closure": "1 where the contacts resist some force in every direction, else 0.",
+    "min_weight": (
+        "How evenly the contacts share the load where nothing pushes the object, from 0 to 1; 0 means that some push "
+        "is not resisted at all."
+    ),
+    "balance": "How well the contacts take over six pushes along the object's axes, from 0 to 1.",
 }
+_INSIDE: Final = "The open hand overlapped the object there, so it could not close: deeper is lower."
+#: Types of grasp of the iCub's hands, whose posture turns the thumb; a learned synergy has a name of its own.
+_TURN_THE_THUMB: Final = ("power", "pinch", "tripod")
 
 
 def glossary(report: RunReport) -> list[tuple[str, str]]:
@@ -50,9 +58,11 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
         meaning = "The model's mean over where an execution may end up: there a good place is one that holds."
         words.append(("averaged over the input noise", meaning))
     quality, contact = str(report.settings.get("quality", "")), report.settings.get("contact")
-    if quality in _QUALITIES:
+    if quality in _QUALITIES and not report.counted:
         words.append((f"quality ({quality})", _QUALITIES[quality]))
-        words.append(("below 0", "The open hand overlapped the object there, so it could not close: deeper is lower."))
+        open_border = "Some push is not resisted: the more is missing, the lower. Or the status is a collision: "
+        signed = quality == "signed_epsilon"
+        words.append(("below 0", open_border + _INSIDE[0].lower() + _INSIDE[1:] if signed else _INSIDE))
     if report.quality_name.endswith(" shapes"):
         words.append(("over shapes", "Mean over equally likely shapes, all of which agree with what was measured."))
     if contact == "graded":
@@ -60,8 +70,16 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
             ("graded contacts", "A soft touch: a point counts more the nearer it is to the skin, up to 6 mm away.")
         )
     if "s1" in [v.name for v in report.variables] or any("s1" in c.pose for c in report.candidates):
-        words.append(("s1", "Posture of the hand along its first synergy, in radians; here it turns the thumb."))
+        words.append(("s1", _posture(report)))
     return words
+
+
+def _posture(report: RunReport) -> str:
+    """Return what the variable s1 does, which is the hand's own, or its synergy's."""
+    hand, preshape = str(report.settings.get("hand", "")), report.settings.get("preshape")
+    if hand.startswith("icub-") and preshape in _TURN_THE_THUMB:
+        return "Posture of the hand along its first synergy; here it turns the thumb."
+    return "Posture of the hand: how far it is moved along what its description, or its synergy file, says for s1."
 
 
 def _of_executions(report: RunReport, better: str) -> list[tuple[str, str]]:
