@@ -52,6 +52,8 @@ def test_run_continue_report(here, capsys):
     assert (here / "here/tables/cheap.csv").exists()
     assert surehold("campaign report runs/campaigns/cheap") == 0
     assert (here / "runs/campaigns/campaigns.html").exists()
+    assert surehold("campaign report cheap.yaml --out there") == 0, "a plan is named as it was for campaign run"
+    assert "A cheap plan" in (here / "there/campaigns.html").read_text()
 
 
 def test_shares_and_parts(here, capsys):
@@ -107,6 +109,7 @@ def test_list_shows_every_plan(capsys):
         ("campaign run cheap.yaml --out cheap.yaml", "cannot be written"),
         ("campaign report", "holds no table"),
         ("campaign report gone", "holds no table"),
+        ("campaign report gone.yaml", "'runs/campaigns/gone' holds no table of a campaign; run one first"),
         ("campaign rum", "rum"),
     ],
 )

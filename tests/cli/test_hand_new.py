@@ -85,6 +85,7 @@ def test_what_looks_wrong_is_said_and_advised_where_nothing_closes(here, capsys)
     ("line", "words"),
     [
         ("hand new nowhere.xml", "cannot read 'nowhere.xml'"),
+        ("hand new old.yaml", "'old.yaml' is a description, not a model; look at it with: surehold hand show old.yaml"),
         ("hand new text.stl", "no model of a hand"),
         ("hand new text.xml", "not a model that MuJoCo can read"),
         ("hand new models/five.xml --out old.yaml", "'old.yaml' exists already; name another file with --out"),

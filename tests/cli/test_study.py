@@ -187,6 +187,10 @@ def test_a_worker_by_command(study, capsys):
     study("create r --problem rkhs --initial 3")
     assert run(["study", "work", "r", "--trials", "3"]) == 0
     assert "Done: 3 trials" in capsys.readouterr().out
+    study("stop r --trials 3")
+    assert run(["study", "work", "r"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "Done: 0 trials by this worker: the study has stopped, the budget of 3 trials is used up." in told
 
 
 def test_a_worker_all_of_whose_trials_failed_says_so(study, capsys):

@@ -109,7 +109,7 @@ def _curve_panel(records: Records, problem: str, measure: str, band: float) -> P
         return None
     verticals = ((float(np.median(splits)), "first split"),) if splits else ()
     return Panel(
-        problem, "trial", LABELS[measure], tuple(lines), tuple(bands), (), verticals, float(cells[0]["initial"])
+        problem, "trials", LABELS[measure], tuple(lines), tuple(bands), (), verticals, float(cells[0]["initial"])
     )
 
 

@@ -97,7 +97,9 @@ def run(
 def report(
     tables: Annotated[
         list[str] | None,
-        typer.Argument(help="Shipped plans or folders of tables; by default every folder in runs/campaigns."),
+        typer.Argument(
+            help="Folders of tables, or plans whose tables are in runs/campaigns; by default every folder there."
+        ),
     ] = None,
     out: Annotated[str, typer.Option(help="Folder of the page and the CSVs; by default runs/campaigns.")] = "",
     illustrations: Annotated[
@@ -109,7 +111,7 @@ def report(
     from surehold.campaigns.report import write_report
     from surehold.cli.terminal import terminal
 
-    folders = [Path(text) if Path(text).exists() else folder_of(text) for text in tables or []] or known_folders()
+    folders = [table_of(text) for text in tables or []] or known_folders()
     console = terminal()
     page = write_report(folders, out or CAMPAIGNS, illustrations=illustrations, say=lambda text: console.print(text))
     console.print(f"Report: {page}", markup=False, soft_wrap=True)
@@ -147,6 +149,14 @@ CAMPAIGNS = Path("runs") / "campaigns"
 def folder_of(name: str) -> Path:
     """Return the default folder of a plan's table."""
     return CAMPAIGNS / name
+
+
+def table_of(text: str) -> Path:
+    """Return the folder or file of a table that is named so, or by its plan."""
+    path = Path(text)
+    if path.suffix in (".yaml", ".yml"):  # as it was given to `campaign run`
+        return folder_of(path.stem)
+    return path if path.exists() else folder_of(text)
 
 
 def known_folders() -> list[Path]:

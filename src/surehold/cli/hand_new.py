@@ -31,6 +31,11 @@ def new(
     from surehold.grasping.hand.proposal import propose_hand
     from surehold.store.atomic import write_file
 
+    if Path(model).suffix.lower() in (".yaml", ".yml"):
+        raise InputError(
+            f"'{model}' is a description, not a model; look at it with: surehold hand show {shlex.quote(model)}. A new "
+            "one is proposed from the hand's .xml or .urdf file."
+        )
     file = Path(out or f"{Path(model).stem}.yaml")
     if file.suffix.lower() not in (".yaml", ".yml"):
         raise InputError(f"--out is {str(file)!r}; a description is a .yaml file.")

@@ -63,7 +63,8 @@ def work(
             console.print(f"Ended after {amount(count, 'trial')}; the one under way is let go.", markup=False)
             raise SystemExit(130) from None  # typer.Exit(130) reads as an interruption with nothing to keep
     failed = f", {'all' if failures == count else failures} failed" * bool(failures)
-    console.print(f"Done: {amount(count, 'trial')} by this worker{failed}.", markup=False)
+    over = f": the study has stopped, {study.stopped()}" if not count and study.stopped() else ""
+    console.print(f"Done: {amount(count, 'trial')} by this worker{failed}{over}.", markup=False, soft_wrap=True)
     if failures and failures == count:
         raise typer.Exit(1)
 

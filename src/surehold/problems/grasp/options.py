@@ -135,7 +135,10 @@ class DescribedGrasp(GraspOptions, total=False):
         ),
     ]
     variables: Annotated[
-        Sequence[str], GraspOption(("dx", "dy"), f"Free variables, of {','.join(VARIABLES)}.", text=list)
+        Sequence[str],
+        GraspOption(
+            ("dx", "dy"), f"Free variables, of {','.join(VARIABLES)}; of a synergy file also s2,s3.", text=list
+        ),
     ]
     unit: Annotated[str, GraspOption("", "Unit of a mesh file or a cloud: mm, cm, m or in.")]
     mass: Annotated[
