@@ -184,6 +184,14 @@ def test_what_lies_within_two_deviations_is_said_of_normal_noise_only(gm_report,
     assert f"{100.0 * within.mean():.0f} %" in said or not normal
 
 
+def test_the_line_of_one_variable_is_explained_below_its_figure(rkhs_report):
+    line = "line: two standard deviations of the input noise to each side"
+    noisy = tuple(replace(c, noise=np.eye(1) * 1e-4) for c in rkhs_report.candidates)
+    assert line in render(replace(rkhs_report, candidates=noisy, normal_noise=True))
+    exact = tuple(replace(c, noise=None) for c in rkhs_report.candidates)
+    assert line not in render(replace(rkhs_report, candidates=exact))
+
+
 def test_a_ring_is_no_line_because_of_its_units(gm_report):
     scale, variables = np.array([1e-12, 1e9]), gm_report.variables
     others = [replace(v, lower=v.lower * s, upper=v.upper * s) for v, s in zip(variables, scale, strict=True)]

@@ -116,6 +116,16 @@ def maximize(
     start = initial
     if start is None:
         start = min(defaults.initial or Optimizer.default_n_initial(chosen.box), budget)
+    limits = {
+        "constraints": ", ".join(constraint or ()),
+        "allowed": ", ".join(allowed or ()),
+        "feasible": feasible,
+        "failures": failures,
+        "safety": safety,
+        "first": "; ".join(first or ()),
+        "guess": guess,
+        "outcome": "" if outcome == "value" else outcome,
+    }
     report = run_session(
         chosen,
         title=f"{direction.capitalize()} {chosen.name}",
@@ -134,6 +144,7 @@ def maximize(
             "input noise": noise_text,
             "surrogate": surrogate or "default",
             **border,
+            **{option: given for option, given in limits.items() if given not in ("", None)},
         },
         direction=direction,
         outcome=outcome,
