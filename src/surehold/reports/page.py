@@ -15,7 +15,7 @@ from surehold.reports.run_report import Candidate, RunReport, Scene, Surface, Va
 from surehold.reports.scene import scene_data
 from surehold.reports.trial_rows import trial_rows
 from surehold.reports.verdict import verdict
-from surehold.reports.wording import change, coordinate, coordinates, halved, number, percent, worth
+from surehold.reports.wording import change, coordinate, coordinates, halved, number, percent, setting, worth
 
 __all__ = ["TEMPLATES", "environment", "render", "scene_context", "table_rows"]
 
@@ -66,7 +66,7 @@ def render(report: RunReport, drawings: Mapping[str, str] | None = None) -> str:
             figure_script=Markup((TEMPLATES / "figures.js").read_text(encoding="utf-8")),
             rows=table_rows(report),
             words=glossary(report),
-            settings=[("seed", report.seed), *((k, _setting(v)) for k, v in report.settings.items() if k != "seed")],
+            settings=[("seed", report.seed), *((k, setting(v)) for k, v in report.settings.items() if k != "seed")],
             trials=trials,
             **scene_context(shown, [_scene_note(report, c) for c in shown], [_label(report, c) for c in shown]),
         )
@@ -301,11 +301,3 @@ def _expected(report: RunReport, candidate: Candidate, deviation: float | None) 
 
 def _heading(variable: Variable) -> str:
     return f"{variable.label}{' (drawn)' * variable.drawn}"
-
-
-def _setting(value: Any) -> str:
-    if value is None:
-        return "none"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,12 +1,14 @@
 """Values, places and changes as people write them."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from surehold.reports.run_report import Candidate, RunReport, Variable
 
-__all__ = ["change", "coordinate", "coordinates", "halved", "number", "percent", "worth"]
+__all__ = ["change", "coordinate", "coordinates", "halved", "number", "percent", "setting", "worth"]
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -73,3 +75,27 @@ def change(candidate: Candidate) -> str:
         return ""
     share = 100.0 * (candidate.mean / candidate.quality - 1.0)
     return "unchanged" if abs(share) < 0.5 else f"{share:+.0f}\u00a0%".replace("-", "−")
+
+
+def setting(value: Any) -> str:
+    """Return a setting as people write it: limits and points as the command line takes them."""
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        return ", ".join(_limit(name, v) if _is_limit(v) else f"{name}={setting(v)}" for name, v in value.items())
+    if isinstance(value, list):
+        return "; ".join(map(setting, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _is_limit(value: Any) -> bool:
+    """Tell whether a value is [lower, upper] of an output, as studies store it."""
+    return isinstance(value, list) and len(value) == 2 and all(v is None or isinstance(v, int | float) for v in value)
+
+
+def _limit(name: str, pair: list[Any]) -> str:
+    """Return the limits of an output, [lower, upper], in one line."""
+    lower, upper = (None if number is None else f"{number:g}" for number in pair)
+    return (f"{lower}<=" if lower else "") + name + (f"<={upper}" if upper else "")
