@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 from scipy.stats import kstest
 
 from surehold.errors import InputError
@@ -54,6 +55,32 @@ def test_a_narrow_strip_is_found_by_its_linear_constraints():
     X = BOX.from_unit(U)
     assert np.all((X[:, 0] - X[:, 1] >= -1e-8) & (X[:, 0] - X[:, 1] <= 1.2e-7))
     assert np.ptp(X[:, 0]) > 0.3
+
+
+def test_the_first_known_point_is_the_center_of_the_largest_ball():
+    """In the right triangle with legs of 1 that has the radius 1 - 1 / sqrt(2)."""
+    unit = Box({"a": (0.0, 1.0), "b": (0.0, 1.0)})
+    np.testing.assert_allclose(region("a + b <= 1", box=unit).points[0], 1.0 - 0.5**0.5, atol=1e-9)
+
+
+def test_draws_fill_a_gap_between_walls_that_only_a_function_knows():
+    """Chords are shortened from both ends: a walker that draws in a millionth of one would stay where it is."""
+    line = Box({"a": (0.0, 1.0)})
+    allowed = region(lambda x: 0.5 <= x[0] <= 0.500001, box=line, known=np.array([[0.5000005]]))
+    at = allowed.points[np.zeros(300, dtype=int)].copy()
+    moved = allowed._step(at, np.random.default_rng(0))
+    assert np.mean(moved == at) < 0.02
+    assert kstest((moved[:, 0] - 0.5) / 1e-6, "uniform").pvalue > 0.01
+
+
+def test_points_of_a_design_that_are_not_allowed_are_replaced_by_ones_far_from_all_others():
+    allowed = region("a >= 0.1")
+    wanted, before = np.array([[0.05, 0.5], [0.0, 0.0], [0.0, 0.0]]), np.array([[0.95, 0.05]])
+    found = allowed.design(wanted, before, np.random.default_rng(0))
+    np.testing.assert_array_equal(found[0], wanted[0])
+    assert allowed.contains(found).all()
+    assert np.linalg.norm(found[1] - 1.0) < 0.15, "the corner that is farthest from the two that are there"
+    assert pdist(np.concatenate([before, found])).min() > 0.4
 
 
 def test_a_region_too_small_for_chance_is_found_from_a_known_point():

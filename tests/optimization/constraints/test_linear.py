@@ -17,6 +17,10 @@ from surehold.optimization.constraints.linear import Linear
         ("a <= b", {"a": 1.0, "b": -1.0}, None, 0.0),
         ("-a + 3 < 2 - 2*b", {"a": -1.0, "b": 2.0}, None, -1.0),
         ("link.a-x_1<=0", {"link.a": 1.0, "x_1": -1.0}, None, 0.0),
+        ("3 <= a + b + 1", {"a": 1.0, "b": 1.0}, 2.0, None),
+        ("a + 2*b + a <= 1", {"a": 2.0, "b": 2.0}, None, 1.0),
+        ("3*a + b <= a", {"a": 2.0, "b": 1.0}, None, 0.0),
+        ("1 + a + 2 - .5 <= 5", {"a": 1.0}, None, 2.5),
     ],
 )
 def test_a_text_says_what_the_weights_say(text, weights, lower, upper):

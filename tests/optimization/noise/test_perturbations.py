@@ -71,6 +71,44 @@ def test_average_of_the_model_by_plain_sampling(posterior):
     assert np.all(np.abs(draws.mean(axis=1) - mean) < 5 * draws.std(axis=1) / 200)
 
 
+@pytest.mark.parametrize("noise", [InputNoise.unit(0.1), InputNoise.varying(lambda x: [0.1, 0.2, 0.0])])
+@pytest.mark.parametrize("border", BORDERS)
+def test_slopes_of_the_perturbed_points_are_differences(border, noise):
+    """Also under a condition that nobody sets, whose values the query does not move."""
+    box = Box({"a": (0.0, 1.0), "b": (0.0, 1.0), "w": (0.0, 1.0)}, uncontrolled={"w": [0.2, 0.7]})
+    perturbations = Perturbations.of(noise, box, "unscented", border)
+    U, h = np.array([[0.03, 0.5, 0.4], [0.5, 0.98, 0.1], [0.4, 0.55, 0.9]]), 1e-6
+    points, slopes = perturbations.with_slopes(U)
+    assert ((points[:2, :, :2] > 0.0) & (points[:2, :, :2] < 1.0)).all() == (border == "keep")
+    for k, step in enumerate(h * np.eye(3)):
+        difference = (perturbations.around(U + step) - perturbations.around(U - step)) / (2.0 * h)
+        np.testing.assert_allclose(slopes[:, :, k], difference[:, :, k], atol=1e-9)
+
+
+def test_of_a_perturbation_that_leaves_the_box_along_one_variable_the_others_are_kept():
+    perturbations = Perturbations(gauss_hermite(S, 3), "keep")
+    U = np.array([[0.05, 0.5], [0.5, 0.95]])
+    all_of = U[:, None, :] + perturbations.quadrature.offsets
+    outside = (all_of < 0.0) | (all_of > 1.0)
+    assert np.any(outside.any(axis=2) & (all_of != U[:, None, :]).all(axis=2))
+    expected = np.where(outside, U[:, None, :], all_of)
+    np.testing.assert_array_equal(perturbations.around(U), expected)
+    everything = Perturbations(gauss_hermite(S, 3), "keep", allowed=lambda points: np.ones(len(points), dtype=bool))
+    np.testing.assert_allclose(everything.around(U), expected, atol=1e-15)
+
+
+def test_noise_that_varies_has_its_covariance_under_every_condition():
+    half = np.array([[0.01, 0.008, 0.0], [0.008, 0.02, 0.0], [0.0, 0.0, 0.0]])
+    box = Box({"a": (0.0, 1.0), "b": (0.0, 1.0), "w": (0.0, 1.0)}, uncontrolled={"w": [0.25, 0.75]})
+    perturbations = Perturbations.of(InputNoise.varying(lambda x: half * (1.0 + 2.0 * x[2])), box, "unscented")
+    u = np.array([[0.5, 0.5, 0.0]])
+    points, weights = perturbations.around(u)[0], perturbations.quadrature.weights
+    for condition in (0.25, 0.75):
+        met = np.isclose(points[:, 2], condition)
+        away, share = (points - u[0])[met, :2], weights[met] / weights[met].sum()
+        np.testing.assert_allclose((share[:, None] * away).T @ away, (1.0 + 2.0 * condition) * half[:2, :2], rtol=1e-9)
+
+
 def test_unknown_border():
     with pytest.raises(InputError, match="extend"):
         Perturbations(sigma_points(S), "bounce")
