@@ -90,6 +90,19 @@ def test_no_second_trial_is_sent_where_one_is_under_way(posterior):
     assert abs(first[0] - second[0]) > 0.03
 
 
+def test_an_improvement_is_one_over_what_a_trial_under_way_is_believed_to_give():
+    """On the top between two high trials; over these alone a second trial beside it would improve most."""
+    tried, values = np.array([[0.3], [0.4], [0.5], [0.6]]), np.array([0.2, 0.9, 0.9, 0.2])
+    fixed = {"length_scales": [0.12], "signal_variance": 1.0, "standardize": False}
+    posterior = GaussianProcess(**fixed).fit(tried, values).posterior
+    waiting = History(tried, values, NONE, np.array([[0.45]]))
+    known = posterior.with_pending(waiting.pending)
+    told, believed = (improvement(known, best) for best in (0.9, moments(known, waiting.pending)[0][0]))
+    assert abs(GRID[np.argmax(told), 0] - 0.45) < 0.1 < 0.2 < abs(GRID[np.argmax(believed), 0] - 0.45)
+    u = strategy_of("ei", noisy=True).candidates(posterior, waiting, np.random.default_rng(0))[0, 0]
+    assert abs(u - 0.45) > 0.2
+
+
 def test_the_trust_region_holds_the_candidates(posterior):
     region = TrustRegion(n_initial=2)
     found = strategy_of("ei", trust_region=region).candidates(posterior, HISTORY, np.random.default_rng(0))

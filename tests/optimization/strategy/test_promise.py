@@ -8,6 +8,7 @@ from scipy.stats import norm
 
 import surehold as sh
 from surehold.optimization.acquisition.risk_measures import Risk, RiskImprovement
+from surehold.optimization.constraints.admission import Admission
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import exact, quasi_monte_carlo, sigma_points
 from surehold.optimization.strategy.promise import promise
@@ -59,6 +60,55 @@ def test_of_a_risk_measure(finer, posterior):
     expected = measure.corrected(finer).over(TRIED)(GRID).max()
     found = promise(ranking, posterior, HISTORY, np.random.default_rng(0))
     assert 0.999 * expected <= found < 1.1 * expected, "between two points of the grid there is little more"
+
+
+class Often:
+    """Something that holds with the probability 0.3, wherever."""
+
+    def log_probability(self, U, gradient=False):
+        return np.full(len(U), np.log(0.3)), np.zeros((len(U) if gradient else 0, U.shape[1]))
+
+
+@pytest.mark.parametrize("risk", ["mean", "cvar"])
+def test_where_nothing_feasible_is_known_everything_promises_and_what_may_fail_promises_less(risk, posterior):
+    ranking = Ranking(Perturbations(quasi_monte_carlo(S)), Perturbations(sigma_points(S)), Risk(risk), False)
+
+    def of(history):
+        return promise(ranking, posterior, history, np.random.default_rng(0))
+
+    assert of(HISTORY._replace(tried=NONE, observed=np.empty(0))) == np.inf
+    assert of(HISTORY._replace(admission=Admission(requirements=(Often(),)))) == pytest.approx(
+        0.3 * of(HISTORY), rel=1e-3
+    )
+    assert of(HISTORY._replace(admission=Admission(safe=lambda U: np.zeros(len(U), dtype=bool)))) == 0.0
+    under_way = GRID[[np.argmax(posterior.average(GRID, *quasi_monte_carlo(S)).mean.mean(axis=0))]]
+    assert of(HISTORY._replace(pending=under_way)) == of(HISTORY) > 0.0, "trials under way promise nothing yet"
+
+
+def test_of_the_worst_case_it_is_what_the_best_mean_may_gain():
+    """The input that is best by its mean is another one than that whose worst case is."""
+    tried = np.linspace(0.0, 1.0, 26)[:, None]
+    values = np.exp(-0.5 * ((tried[:, 0] - 0.25) / 0.06) ** 2) + 0.6 * np.exp(-0.5 * ((tried[:, 0] - 0.7) / 0.2) ** 2)
+    posterior, rule = GaussianProcess().fit(tried, values).posterior, quasi_monte_carlo(S)
+    worst, mean = (Ranking(Perturbations(rule), Perturbations(rule), Risk(name), False) for name in ("worst", "mean"))
+    history = History(tried, values, NONE, NONE)
+    assert worst.order(posterior, tried)[0] != mean.order(posterior, tried)[0]
+    found = [promise(ranking, posterior, history, np.random.default_rng(0)) for ranking in (worst, mean)]
+    assert found[0] == found[1]
+
+
+def test_of_noisy_values_it_is_over_the_best_one_by_the_model():
+    """One number for all particles, where the robust scale has one each."""
+    values = VALUES + 0.3 * np.random.default_rng(2).standard_normal(len(VALUES))
+    points, history = Perturbations(exact(1)), History(TRIED, values, NONE, NONE)
+    posterior = GaussianProcess(noise="inferred").fit(TRIED, values).posterior
+    moments, tried = posterior.moments(GRID), posterior.moments(TRIED).mean
+    std = np.sqrt(moments.variance)
+    expected = improvement(moments.mean, std, tried.mean(axis=0).max()).max()
+    each = improvement(moments.mean, std, tried[:, [int(np.argmax(tried.mean(axis=0)))]]).max()
+    assert abs(each - expected) > 0.1 * expected
+    found = promise(Ranking(points, points, Risk(), True), posterior, history, np.random.default_rng(0))
+    assert found == pytest.approx(expected, rel=2e-3)
 
 
 @pytest.mark.parametrize("risk", ["mean", "cvar"])

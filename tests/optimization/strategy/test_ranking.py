@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.constraints.admission import Admission
 from surehold.optimization.noise.perturbations import Perturbations
 from surehold.optimization.noise.quadratures import Quadrature, exact, quasi_monte_carlo, sigma_points
-from surehold.optimization.strategy.ranking import History, Ranking
+from surehold.optimization.strategy.ranking import History, Ranking, _latest_of_equals
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 
 S = np.array([[0.05**2]])
@@ -167,3 +168,72 @@ def test_what_was_ranked_is_ranked_again_only_for_other_trials_or_another_model(
     averse = replace(ranking, risk=Risk("worst"))
     assert np.array_equal(averse.trials(posterior, HISTORY, False), averse.order(posterior, TRIED))
     assert not np.array_equal(averse.order(posterior, TRIED), ranking.order(posterior, TRIED))
+
+
+def test_of_the_tops_that_are_found_the_finer_perturbations_choose(posterior, monkeypatch):
+    """By small perturbations the steep hill is the highest, by larger ones the broad hill is."""
+    tops = np.array([[0.25], [0.7]])
+    monkeypatch.setattr("surehold.optimization.strategy.ranking.multistart", lambda *_: tops)
+    near = Perturbations(Quadrature(np.array([[-1e-3], [1e-3]]), np.full(2, 0.5)))
+    wide = Perturbations(quasi_monte_carlo(np.array([[0.1**2]]), 7))
+    for finer, hill in ((near, 0.25), (wide, 0.7)):
+        best = Ranking(near, near, Risk(), False, finer=finer).best(posterior, HISTORY, np.random.default_rng(0))
+        assert best[0] == pytest.approx(hill, abs=0.1)
+
+
+def test_where_nothing_else_may_be_tried_the_best_tried_input_is_the_best_one(posterior):
+    nowhere = Admission(safe=lambda U: np.zeros(len(U), dtype=bool))
+    best = ranking_of().best(posterior, HISTORY, np.random.default_rng(0), nowhere)
+    np.testing.assert_array_equal(best, TRIED[np.argmax(outcome(posterior, TRIED))])
+
+
+def test_what_particles_believe_of_trials_under_way(posterior):
+    """Of the unscented criterion it is the highest mean of all particles, not the highest of one of them."""
+    pending, ranking = np.array([[0.26], [0.9], [0.14]]), ranking_of()
+    mean = posterior.average(pending, *ranking.accurate.quadrature).mean  # (m, p)
+    assert mean.max() > mean.mean(axis=0).max() + 1e-6
+    assert ranking.believed(posterior, pending, "unscented") == pytest.approx(mean.mean(axis=0).max(), abs=1e-12)
+    np.testing.assert_allclose(ranking.believed(posterior, pending, "robust")[:, 0], mean.max(axis=1), atol=1e-12)
+
+
+def test_what_is_stated_of_a_risk_measure_has_no_error_of_its_draws():
+    """Of the mean less 0 deviations there is a closed form, that of the model between few trials."""
+    posterior = GaussianProcess().fit(TRIED[:5], f(TRIED[:5])).posterior
+    ranking = replace(ranking_of(), risk=Risk("mean-std", beta=0.0))
+    U = np.array([[0.1], [0.5], [0.8]])
+    moments = posterior.average(U, *ranking.accurate.quadrature)
+    assert np.sqrt(moments.variance).min() > 0.01
+    np.testing.assert_allclose(ranking.worth(posterior, U), moments.mean.mean(axis=0), atol=1e-9)
+
+
+def test_a_risk_measure_decides_nothing_where_inputs_are_exact(posterior):
+    points = Perturbations(exact(1))
+    assert Ranking(points, points, Risk("cvar"), True).judged(posterior, TRIED[0], TRIED[1]) is None
+    assert ranking_of().judged(posterior, TRIED[0], TRIED[1]) is None
+    averse = ranking_of("cvar", finer=FINER)
+    found = averse.judged(posterior, TRIED[0], TRIED[1])
+    np.testing.assert_allclose(found, outcome(posterior, TRIED[:2], "cvar"), atol=0.02)
+
+
+def test_of_equal_values_the_latest_is_first():
+    values = np.random.default_rng(0).integers(0, 3, 40).astype(float)
+    np.testing.assert_array_equal(_latest_of_equals(values), np.lexsort([-np.arange(40), -values]))
+
+
+def test_of_many_trials_those_with_the_highest_values_are_looked_at(posterior, monkeypatch):
+    """One observed too high is not first, one observed too low is not found; the others follow by their values."""
+    values = f(TRIED)
+    low, high = int(np.argmax(values)), int(np.argmin(values))
+    values[low], values[high] = -1.0, 5.0
+    history, exactly = History(TRIED, values, NONE, NONE), Perturbations(exact(1))
+    ranking = Ranking(exactly, exactly, Risk(), noisy=True)
+    assert ranking.trials(posterior, history, True)[0] == low
+    monkeypatch.setattr("surehold.optimization.strategy.ranking.CONTENDERS", 6)
+    by_value = np.argsort(-values)
+    order = ranking.order(posterior, TRIED, values)
+    modelled = posterior.moments(TRIED).mean.mean(axis=0)
+    np.testing.assert_array_equal(order[:6], by_value[:6][np.argsort(-modelled[by_value[:6]])])
+    np.testing.assert_array_equal(order[6:], by_value[6:])
+    by_model = ranking.trials(posterior, history, True)
+    np.testing.assert_array_equal(by_model[:6], order[:6])
+    assert ranking.incumbent(posterior, history, "exact")[0] == pytest.approx(modelled[by_value[1:6]].max(), abs=1e-9)

@@ -54,6 +54,20 @@ def test_what_many_perturbations_promise_is_compared_with_what_few_do(finer):
     assert found.max() < 0.155
 
 
+def test_an_improvement_is_one_over_trials_under_way_too(posterior):
+    ranking, history = Ranking(ACCURATE, COARSE, Risk("cvar"), False), History(TRIED, VALUES, NONE, NONE)
+    best = ranking.shortlist(posterior, history)
+    gains = []
+    for pending in (NONE, np.array([[0.2], [0.88]])):
+        rng = np.random.default_rng(4)
+        some = history._replace(pending=pending)
+        gains.append(most_improving(ranking, posterior, best, None, some, rng, posterior.regions)[1])
+        measure = RiskImprovement(posterior, ACCURATE, Risk("cvar"), None, np.random.default_rng(4))
+        expected = measure.over(np.concatenate([best, pending]))(GRID).max()
+        assert 0.999 * expected <= gains[-1] < 1.1 * expected
+    assert gains[1] < 0.8 * gains[0]
+
+
 def test_the_worst_case_is_tried_where_it_is_worst(posterior):
     ranking = Ranking(ACCURATE, COARSE, Risk("worst"), False)
     found = RiskAverse(ranking, 2.0).candidates(posterior, History(TRIED, VALUES, NONE, NONE), np.random.default_rng(5))

@@ -4,8 +4,9 @@ import pytest
 import surehold as sh
 from surehold.errors import InputError
 from surehold.optimization.acquisition.risk_measures import Risk
+from surehold.optimization.constraints.admission import Admission
 from surehold.optimization.noise.perturbations import Perturbations
-from surehold.optimization.noise.quadratures import exact
+from surehold.optimization.noise.quadratures import exact, sigma_points
 from surehold.optimization.strategy.ranking import History, Ranking
 from surehold.optimization.strategy.thompson import Thompson
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
@@ -59,3 +60,27 @@ def test_a_point_is_taken_as_often_as_it_is_the_maximum():
     draws = mean + np.random.default_rng(0).standard_normal((20_000, 201)) @ joint
     share = np.mean(grid[draws.argmax(axis=1), 0] < 0.5)
     assert np.mean(np.array(taken) < 0.5) == pytest.approx(share, abs=4.0 * np.sqrt(share * (1.0 - share) / 300))
+
+
+def test_outcomes_are_averages_of_the_draw_over_the_perturbations():
+    """Of a spike and a hill that are well known a draw is highest on the spike, its outcome on the hill."""
+    X = np.linspace(0.0, 1.0, 41)[:, None]
+    y = np.exp(-0.5 * ((X[:, 0] - 0.25) / 0.04) ** 2) + 0.75 * np.exp(-0.5 * ((X[:, 0] - 0.7) / 0.2) ** 2)
+    posterior, around = GaussianProcess().fit(X, y).posterior, Perturbations(sigma_points(np.array([[0.1**2]])))
+    history = History(X, y, np.empty((0, 1)), np.empty((0, 1)))
+    for exactly, top in ((True, 0.25), (False, 0.7)):
+        strategy = Thompson(Ranking(around, around, Risk(), noisy=False), exactly=exactly)
+        found = [strategy.candidates(posterior, history, np.random.default_rng(seed))[0, 0] for seed in range(5)]
+        np.testing.assert_allclose(found, top, atol=0.1)
+
+
+def test_a_point_is_admitted_as_often_as_what_is_required_holds_there():
+    class Mostly:
+        def log_probability(self, U, gradient=False):
+            return np.log(np.where(U[:, 0] < 0.5, 0.3, 0.8)), np.zeros((0, 1))
+
+    points, admission = np.array([[0.2], [0.7]]), Admission(requirements=(Mostly(),))
+    rng = np.random.default_rng(0)
+    admitted = [len(Thompson._admitted(admission, points, rng)) for _ in range(500)]
+    assert min(admitted) == 1, "the likeliest point stays whatever is drawn"
+    assert np.mean(np.array(admitted) == 2) == pytest.approx(0.3, abs=4.0 * np.sqrt(0.3 * 0.7 / 500))
