@@ -2,13 +2,17 @@ import re
 
 import numpy as np
 import pytest
-from scipy.special import ndtr
+from scipy.optimize import brentq
+from scipy.special import ndtr, ndtri
 
 from surehold.errors import InputError, SureholdError
 from surehold.optimization.box import Box
+from surehold.optimization.constraints.feasibility import Succeeds, SuccessModel
 from surehold.optimization.constraints.linear import Linear
 from surehold.optimization.maximization import minimize
 from surehold.optimization.noise.input_noise import InputNoise
+from surehold.optimization.noise.perturbations import Perturbations
+from surehold.optimization.noise.quadratures import exact
 from surehold.optimization.optimizer import Optimizer
 
 BOX = Box.unit(2)
@@ -315,6 +319,105 @@ def test_a_place_that_fails_too_often_says_how_often_and_how_often_is_asked_for(
     optimizer.restore(X, y)
     best = optimizer.recommend()
     assert best.x[0] < 0.55
+    assert optimizer.recommend("box").x[0] < 0.55
     told = re.search(r"only ([\d.]+) % of its executions are expected to succeed, and 95 % are asked for", best.refused)
     assert told, best.refused
     assert 30.0 < float(told[1]) < 80.0
+    model = SuccessModel(X, np.isfinite(y))
+    logs = Succeeds(model, optimizer._ranking.accurate).log_probability(X[[np.nanargmax(y)]])[0]
+    assert 0.0 <= 100.0 * np.exp(logs[0]) - float(told[1]) < 0.1, "rounded up it could be what is asked for"
+
+
+LINE = np.linspace(0.0, 1.0, 13)[:, None]
+
+
+def straight(outputs=1, limit=0.6, X=LINE, **settings):
+    """An optimizer of one variable whose outputs are that variable, each with an upper limit."""
+    names = [f"c{k}" for k in range(outputs)]
+    settings = {"constraints": dict.fromkeys(names, (None, limit)), "seed": 0, "direction": "minimize"} | settings
+    optimizer = Optimizer(Box({"x": (0.0, 1.0)}), **settings)
+    optimizer.restore(X, -X[:, 0], outputs=np.repeat(X, outputs, axis=1))
+    return optimizer
+
+
+@pytest.mark.parametrize("outputs", [1, 2, 3])
+def test_what_may_break_limits_is_shared_by_all_of_them(outputs):
+    """N(x, 0.05^2) keeps x <= 0.6 with the probability p up to 0.6 - 0.05 z(p), and each limit has its part of 1 - p."""
+    optimizer = straight(outputs, input_noise=InputNoise({"x": 0.05}))
+    requirements = optimizer._requirements.admission(optimizer._trials).requirements
+    assert len(requirements) == outputs
+    sought = optimizer._requirements._sought
+    assert 0.95 < sought < 0.98
+    for requirement in requirements:
+        at = brentq(lambda x, r=requirement: r.log_probability(np.array([[x]]))[0][0] - np.log(0.5), 0.3, 0.6)
+        assert at == pytest.approx(0.6 - 0.05 * ndtri(1.0 - (1.0 - sought) / outputs), abs=2e-3)
+
+
+@pytest.mark.parametrize("strays", [True, False])
+def test_safe_is_what_is_safe_where_the_trial_may_end_up(strays):
+    """Up to 0.6 where trials reach what is commanded; where they stray, which models know less of, less than 95 % reach."""
+    optimizer = straight(
+        input_noise=InputNoise({"x": 0.05}), noise_while_exploring=strays, safety=0.95, initial_points=[[0.2]]
+    )
+    safe = optimizer._requirements.admission(optimizer._trials).safe
+    grid = np.linspace(0.3, 0.7, 401)[:, None]
+    farthest = grid[safe(grid)].max()
+    if strays:
+        assert 0.6 - 0.05 * ndtri(0.99) < farthest <= 0.6 - 0.05 * ndtri(0.95)
+    else:
+        assert farthest == pytest.approx(0.6, abs=2e-3)
+
+
+def test_that_a_trial_succeeds_counts_twice():
+    optimizer = Optimizer(Box({"x": (0.0, 1.0)}), seed=0)
+    y = np.where(LINE[:, 0] < 0.5, LINE[:, 0], np.nan)
+    optimizer.restore(LINE, y)
+    admission = optimizer._requirements.admission(optimizer._trials)
+    once = Succeeds(SuccessModel(LINE, np.isfinite(y)), Perturbations(exact(1)))
+    U = np.array([[0.2], [0.5], [0.55], [0.8]])
+    assert admission.log_probability(U)[0] == pytest.approx(2.0 * once.log_probability(U)[0])
+    assert once.log_probability(U)[0].min() < np.log(0.3)
+
+
+def test_the_likeliest_trial_is_the_nearest_and_one_that_is_not_allowed_is_none():
+    """All executions at 0.9 would keep the limit, but it is not allowed; at 0.45 a few do."""
+    X = np.array([[0.1], [0.3], [0.45], [0.9]])
+    optimizer = Optimizer(
+        Box({"x": (0.0, 1.0)}), allowed="x <= 0.5", constraints={"c": (0.6, None)}, input_noise=InputNoise({"x": 0.1})
+    )
+    optimizer.restore(X, np.ones(4), outputs=X)
+    best = optimizer.recommend()
+    assert best.x.tolist() == [0.45]
+    assert 0.0 < best.feasible < 0.5
+
+
+def test_where_nothing_is_feasible_trials_under_way_are_kept_away_from():
+    """The place that is likeliest to keep the limit is sought; with a trial on its way there, one beside it."""
+    X = np.random.default_rng(0).random((12, 2))
+    missed = 1.0 + np.sum((X - 0.4) ** 2, axis=1)
+    optimizer = Optimizer(BOX, constraints={"c": (None, 0.9)}, seed=0)
+    optimizer.restore(X, X[:, 0], outputs=missed[:, None])
+    first, second, third = optimizer.ask(3)
+    apart = [np.linalg.norm(one - other) for one, other in ((first, second), (first, third), (second, third))]
+    assert min(apart) > 0.05
+
+
+def test_where_no_candidate_is_left_the_safest_trial_is_repeated():
+    optimizer = straight(
+        X=LINE[:8], input_noise=InputNoise({"x": 0.1}), noise_while_exploring=True, safety=0.95, initial_points=[[0.2]]
+    )
+    again = optimizer._requirements.otherwise(optimizer._trials, np.random.default_rng(0))
+    share = optimizer._requirements.feasibility(optimizer._trials)
+    assert np.ptp(share) > 0.1
+    assert share[np.flatnonzero(LINE[:, 0] == again[0])[0]] == share.max()
+
+
+def test_after_many_trials_failed_ones_count_as_the_lowest_value():
+    y = np.where(LINE[:, 0] < 0.5, LINE[:, 0], np.nan)
+    optimizer = Optimizer(Box({"x": (0.0, 1.0)}), seed=0)
+    optimizer.restore(LINE, y)
+    requirements, trials = optimizer._requirements, optimizer._trials
+    for failures, modelled in ((13, True), (12, False)):
+        requirements.failures = failures
+        assert requirements.model_failures(trials) is modelled
+        assert (requirements.admission(trials) is not None) is modelled
