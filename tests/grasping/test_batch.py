@@ -1,10 +1,14 @@
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from surehold.errors import InputError
 from surehold.grasping import OBJECTS, STATUSES, Simulator, default_pose, grasp_batch
+from surehold.grasping.hand.named import hand_named
+from surehold.grasping.hand.synergy import preshape_of
+from surehold.grasping.trial_loop import UNDECIDED, run_trials
 
 
 def random_poses(simulator, n, seed):
@@ -41,11 +45,44 @@ def test_a_batch_is_its_trials_and_sound(name):
 
 
 def test_the_number_of_workers_changes_nothing():
+    """The last worker takes what is left; memory that it does not fill holds another batch, the same one backwards."""
     simulator = Simulator(obj="mug")
     poses, s1 = random_poses(simulator, 230, 2)
-    alone, together = (grasp_batch(simulator, poses, s1, workers=w) for w in (1, 2))
+    alone = grasp_batch(simulator, poses, s1)
+    grasp_batch(simulator, poses[::-1], s1[::-1])
+    together = grasp_batch(simulator, poses, s1, workers=2)
     for name in ("quality", "status", "penetration", "contacts", "fallbacks"):
         np.testing.assert_array_equal(getattr(alone, name), getattr(together, name), err_msg=name)
+
+
+def test_trials_that_rounding_spoils_are_made_again_by_themselves(monkeypatch):
+    simulator = Simulator(obj="mug")
+    poses, s1 = random_poses(simulator, 40, 4)
+    expected = grasp_batch(simulator, poses, s1)
+
+    def spoiled(*arguments):
+        run_trials(*arguments)
+        arguments[-1][5::7, :2] = np.nan, UNDECIDED
+
+    monkeypatch.setattr("surehold.grasping.batch.run_trials", spoiled)
+    found = grasp_batch(simulator, poses, s1)
+    for name in ("quality", "status", "penetration", "contacts", "fallbacks"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
+
+
+def test_further_amplitudes_are_those_of_single_trials():
+    hand = hand_named("icub-left")
+    power = preshape_of(hand, "power")
+    spread = np.zeros(power.start.shape)
+    spread[:, 0] = np.linspace(-0.3, 0.3, len(spread))
+    preshapes = {"power": power._replace(further=(spread,), further_ranges=((-1.0, 1.0),))}
+    simulator = Simulator(hand=replace(hand, preshapes=preshapes), obj="mug")
+    poses, s1 = random_poses(simulator, 60, 5)
+    both = np.column_stack([s1, np.random.default_rng(6).uniform(-1.0, 1.0, 60)])
+    batch, plain = grasp_batch(simulator, poses, both), grasp_batch(simulator, poses, s1)
+    assert np.any(batch.quality != plain.quality)
+    for i in np.flatnonzero(batch.quality > 0.0)[:6]:
+        assert batch.quality[i] == simulator.grasp(poses[i], tuple(both[i].tolist())).quality
 
 
 def test_a_simulator_travels_without_its_distance_field():

@@ -5,7 +5,7 @@ import pytest
 
 from surehold.grasping.closing.link_speed import begins, lasts, speed, speed_along
 from surehold.grasping.hand.kinematics import finger_frames, link_ends
-from surehold.grasping.hand.model import CLOSED
+from surehold.grasping.hand.model import CLOSED, chain_row
 from surehold.grasping.hand.named import hand_named
 from surehold.grasping.hand.synergy import closing_motion
 
@@ -45,7 +45,41 @@ def test_no_link_moves_farther_than_its_bounds(s1):
     assert tightest < 1.5, "a bound that is never near the truth certifies nothing"
 
 
+def test_a_link_whose_joints_have_stopped_or_are_at_their_ends_stands_still():
+    hand = hand_named("icub-left")
+    motion, reach = np.stack(closing_motion(hand, 0.0, "power")), hand.reach()
+    turns, across, t = np.zeros((4, 3)), np.array([0.0, 0.0, 1.0]), 1.0
+    turns[:, 0] = 1.0
+    never, before, after = (np.full(hand.radii.shape, at) for at in (np.inf, t, t + 1e-9))
+    for k in range(1, 4):
+        assert speed(1, k, t, motion, never, reach) > 0.0
+        assert speed(1, k, t, motion, after, reach) == speed(1, k, t, motion, never, reach)
+        assert speed(1, k, t, motion, before, reach) == 0.0
+        assert speed(1, k, 1e3, motion, never, reach) == 0.0
+        assert speed_along(1, k, t, across, motion, before, reach, hand.chains, turns) == (0.0, 0.0)
+        assert begins(1, k, motion, np.zeros(hand.radii.shape)) == np.inf
+
+
+@pytest.mark.parametrize("along", [0, 1, 2])
+def test_a_link_that_slides_moves_along_its_axis(along):
+    """The bound of a sliding joint holds along every direction; a turning one behind it moves the link by its lever."""
+    slide = chain_row(np.zeros(3), np.array([0.0, 0.02, 0.0]), np.eye(3, 4), slides=True)
+    turn = chain_row(np.zeros(3), np.array([0.0, 0.05, 0.0]), np.eye(3, 4))
+    chains, base = np.stack([slide, turn])[None], np.eye(3, 4)[None]
+    motion = np.array([[[0.0, 0.0]], [[0.01, 0.2]], [[0.0, 0.0]], [[0.1, 2.0]]])
+    reach, stop = np.array([[[1.0, 1.0], [0.0, 0.05]]]), np.full((1, 2), np.inf)
+    turns, across = np.tile([0.0, 0.0, 1.0], (2, 1)), np.eye(3)[along]
+    start = link_ends(base, chains, motion[0])
+    for k, lever in ((0, 0.0), (1, 0.05)):
+        v, w = speed_along(0, k, 0.0, across, motion, stop, reach, chains, turns)
+        assert (v, w) == pytest.approx((0.01 + 0.2 * lever * (along != 2), 0.0))
+        for s in (0.1, 1.0, 4.0):
+            way = link_ends(base, chains, motion[0] + s * motion[1])[k] - start[k]
+            assert np.abs(way @ across).max() <= v * s + 1e-12
+
+
 def test_a_way_that_is_never_gone_lasts_for_ever():
+    assert lasts(0.0, 0.0, 0.0) == 0.0
     assert lasts(0.01, 0.0, 0.0) == np.inf
     assert lasts(-0.01, 1.0, 1.0) == 0.0
     assert lasts(0.5, 0.0, 1.0) == pytest.approx(1.0)
