@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
 from surehold.grasping.wrench.friction_cones import contact_wrenches
-from surehold.grasping.wrench.simox import _hull_vertices, object_wrench_space, simox_quality
+from surehold.grasping.wrench.simox import _hull_vertices, _planar_hull, object_wrench_space, simox_quality
 
 # Faces of a cube with corners numbered by the bits of (x, y, z); the object's number depends on the diagonals.
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -67,6 +68,56 @@ def test_quality_equals_the_full_hull():
         w = contact_wrenches(points, normals, 1.0, 8, 0.05, space.origin, tangents, "unit_magnitude")
         expected = vertex_centered_radius_by_qhull(w) / space.radius
         assert simox_quality(points, normals, space) == pytest.approx(expected, abs=1e-7)
+
+
+@pytest.mark.parametrize("turned", [0.0, 1e-8, 3e-6, 1e-5, 4e-5, 1e-3])
+def test_normals_that_point_almost_straight_down(turned):
+    """As rounding leaves them of a flat top: they were refused between 1e-6 and 1e-5 beside -z."""
+    space = object_wrench_space(*cuboid(np.array([0.1, 0.06, 0.04])))
+    points = np.array([[0.0, 0.0, 0.02], [0.05, 0.01, 0.0], [-0.05, 0.0, 0.01], [0.0, 0.03, 0.0], [0.02, -0.03, 0.0]])
+    normals = np.array([[0.0, 0.0, -1.0], [-1.0, 0, 0], [1.0, 0, 0], [0, -1.0, 0], [0, 1.0, 0]])
+    normals[0] = Rotation.from_rotvec([-0.6 * turned, 0.8 * turned, 0.0]).apply(normals[0])
+    across = np.column_stack([-normals[:, 1], normals[:, 0]])  # axis of the smallest rotation from z
+    length = np.hypot(*across.T)
+    angle = np.arctan2(length, normals[:, 2])
+    axes = np.where(length[:, None] > 1e-7, across / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
+    tangents = Rotation.from_rotvec(np.column_stack([axes * angle[:, None], np.zeros(5)])).apply([1.0, 0.0, 0.0])
+    w = contact_wrenches(points, normals, 1.0, 8, 0.05, space.origin, tangents, "unit_magnitude")
+    expected = vertex_centered_radius_by_qhull(w) / space.radius
+    assert simox_quality(points, normals, space) == pytest.approx(expected, abs=1e-6)
+    vertices, faces = cuboid(np.array([3.0, 2.0, 1.0]))
+    tilted = Rotation.from_rotvec([-0.6 * turned, 0.8 * turned, 0.0]).apply(vertices)
+    assert object_wrench_space(tilted, faces).radius == pytest.approx(
+        object_wrench_space(vertices, faces).radius, rel=2.0 * turned + 1e-9
+    )
+
+
+def test_the_object_number_is_of_forces_that_press_into_the_faces():
+    hull = ConvexHull(np.random.default_rng(3).normal(size=(12, 3)))
+    vertices, faces = hull.points, hull.simplices.copy()
+    center = vertices.mean(axis=0)
+    p, q, r = (vertices[faces[:, k]] for k in range(3))
+    inside_out = np.sum(np.cross(q - p, r - p) * (p - center), axis=1) < 0.0
+    faces[inside_out] = faces[inside_out][:, ::-1]
+    normals = -hull.equations[:, :3]
+    tangents = np.array([1.0, 0.0, 0.0]) - (normals[:, :1] / (1.0 + normals[:, 2:])) * (normals + [0.0, 0.0, 1.0])
+    long = np.ptp(vertices, axis=0).max() / 2.0
+    w = contact_wrenches(vertices[faces].mean(axis=1), normals, 1.0, 8, long, center, tangents, "unit_magnitude")
+    expected = vertex_centered_radius_by_qhull(w)
+    opposite = vertex_centered_radius_by_qhull(
+        contact_wrenches(vertices[faces].mean(axis=1), -normals, 1.0, 8, long, center, convention="unit_magnitude")
+    )
+    assert abs(opposite - expected) > 1e-3
+    assert object_wrench_space(vertices, faces).radius == pytest.approx(expected, abs=1e-7)
+
+
+def test_a_point_counts_once_and_points_on_an_edge_are_no_corners():
+    turn = Rotation.from_rotvec([0.0, 0.0, 0.7]).as_matrix()[:2, :2]
+    side = np.linspace(-0.3, 0.4, 8)
+    grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2) @ turn.T
+    assert sorted(_planar_hull(grid)) == [0, 7, 56, 63]
+    assert len(_planar_hull(np.repeat(grid, 3, axis=0))) == 4
+    assert len(_planar_hull(np.repeat(grid[:1], 5, axis=0))) == 1
 
 
 def test_vertices_among_equal_forces():

@@ -98,10 +98,12 @@ def simox_quality(points: ArrayLike, normals: ArrayLike, space: ObjectWrenchSpac
 def _wrenches(points: ArrayLike, normals: ArrayLike, torque_length: float, origin: tuple) -> NDArray[np.float64]:
     """Return the cone edges' wrenches, edge 0 where the smallest rotation from z to the normal carries x, (8 c, 6)."""
     n = finite_array("normals", normals, (None, 3))
-    along = n + np.array([0.0, 0.0, 1.0])
+    x, along = np.array([1.0, 0.0, 0.0]), n + np.array([0.0, 0.0, 1.0])
+    near = along[:, 2] < 1e-6  # 1 + n_z has lost its digits there
+    along[near, 2] = np.sum(n[near, :2] ** 2, axis=1) / (1.0 - n[near, 2])
     down = along[:, 2] <= 1e-12  # there the rotation is any half turn
-    tangents = np.array([1.0, 0.0, 0.0]) - (n[:, 0] / np.where(down, 1.0, along[:, 2]))[:, None] * along
-    tangents[down] = [1.0, 0.0, 0.0]
+    tangents = x - (n[:, 0] / np.where(down, 1.0, along[:, 2]))[:, None] * along
+    tangents[down] = x - n[down, :1] * n[down]
     return contact_wrenches(points, n, FRICTION, EDGES, torque_length, origin, tangents, "unit_magnitude")
 
 
