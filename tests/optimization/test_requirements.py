@@ -342,7 +342,7 @@ def straight(outputs=1, limit=0.6, X=LINE, **settings):
 
 @pytest.mark.parametrize("outputs", [1, 2, 3])
 def test_what_may_break_limits_is_shared_by_all_of_them(outputs):
-    """N(x, 0.05^2) keeps x <= 0.6 with the probability p up to 0.6 - 0.05 z(p), and each limit has its part of 1 - p."""
+    """N(x, 0.05^2) keeps x <= 0.6 with the probability p up to 0.6 - 0.05 z(p); each limit has its part of 1 - p."""
     optimizer = straight(outputs, input_noise=InputNoise({"x": 0.05}))
     requirements = optimizer._requirements.admission(optimizer._trials).requirements
     assert len(requirements) == outputs
@@ -355,7 +355,7 @@ def test_what_may_break_limits_is_shared_by_all_of_them(outputs):
 
 @pytest.mark.parametrize("strays", [True, False])
 def test_safe_is_what_is_safe_where_the_trial_may_end_up(strays):
-    """Up to 0.6 where trials reach what is commanded; where they stray, which models know less of, less than 95 % reach."""
+    """Up to 0.6 where trials reach what is commanded, less than at 95 % where they stray: models know less then."""
     optimizer = straight(
         input_noise=InputNoise({"x": 0.05}), noise_while_exploring=strays, safety=0.95, initial_points=[[0.2]]
     )

@@ -100,7 +100,7 @@ def test_the_object_number_is_of_forces_that_press_into_the_faces():
     inside_out = np.sum(np.cross(q - p, r - p) * (p - center), axis=1) < 0.0
     faces[inside_out] = faces[inside_out][:, ::-1]
     normals = -hull.equations[:, :3]
-    tangents = np.array([1.0, 0.0, 0.0]) - (normals[:, :1] / (1.0 + normals[:, 2:])) * (normals + [0.0, 0.0, 1.0])
+    tangents = np.array([1.0, 0.0, 0.0]) - (normals[:, :1] / (1.0 + normals[:, 2:])) * np.add(normals, (0.0, 0.0, 1.0))
     long = np.ptp(vertices, axis=0).max() / 2.0
     w = contact_wrenches(vertices[faces].mean(axis=1), normals, 1.0, 8, long, center, tangents, "unit_magnitude")
     expected = vertex_centered_radius_by_qhull(w)
