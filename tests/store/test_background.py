@@ -1,10 +1,13 @@
-"""Children that compile: started once, waited for, and never in the way. Each case in a process of its own."""
+"""Children that compile: started once, waited for, and never in the way. Most cases in a process of their own."""
 
 import os
+import shutil
 import subprocess
 import sys
 
 import pytest
+
+from surehold.store import background
 
 PARENT = """
 import logging, sys
@@ -117,3 +120,22 @@ background.begin(Path({folder!r}) / "warm-x", {CHILD.format(folder=folder)!r}, b
             return
         subprocess.run(["sleep", "0.1"], check=True)
     pytest.fail("the child has ended with its parent")
+
+
+def test_a_marker_is_wanted_until_it_is_there_and_a_disk_that_keeps_none_stops_nothing(tmp_path):
+    folder = tmp_path / "cache"
+    folder.mkdir()
+    for expected in (True, False, False):
+        with background.marking(folder / "warm-y") as wanted:
+            assert wanted is expected
+    with background.marking(folder / "warm-z"):
+        shutil.rmtree(folder)
+    assert not folder.exists()
+
+
+def test_a_child_that_has_ended_compiles_no_more(tmp_path, monkeypatch):
+    child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    monkeypatch.setattr(background, "_children", [(child, tmp_path / "warm-x")])
+    assert background.compiling()
+    child.communicate(b"done")
+    assert not background.compiling()
