@@ -145,6 +145,7 @@ def test_moments_against_quadrature(problem, noise):
         (InputNoise(covariance=[[0.01, 0.008], [0.008, 0.01]]), [0.1, 0.2]),
         (InputNoise(covariance=[[0.01, -0.008], [-0.008, 0.02]]), [0.0, 1.0]),
         (InputNoise({"x1": 0.2, "x2": 0.0}), [0.15, 0.25]),
+        (InputNoise({"x1": 0.05, "x2": 0.0}), [0.97, 0.75]),
     ],
 )
 def test_moments_at_the_border_against_sampling(noise, x):
@@ -167,6 +168,11 @@ def test_moments_at_the_border_in_three_dimensions():
         return inside + outside * np.exp(-((center - 0.1) ** 2) / 0.08)
 
     assert p.expectation(x, noise) == pytest.approx(np.prod([one(c) for c in x]), rel=1e-4)
+    correlated = 0.01 * np.array([[1.0, 0.8, 0.0], [0.8, 1.0, -0.4], [0.0, -0.4, 1.0]])
+    noise = InputNoise(covariance=correlated)
+    values = p(perturbed_points(x, p.box, noise, n=200_000, seed=5))
+    assert p.expectation(x, noise) == pytest.approx(values.mean(), abs=4 * values.std() / np.sqrt(200_000))
+    assert p.standard_deviation(x, noise) == pytest.approx(values.std(), rel=0.01)
 
 
 def test_rkhs_expectation_against_adaptive_quadrature():
