@@ -37,3 +37,16 @@ def test_small_differences_of_large_values_are_stated_as_small():
     optimizer.restore(X, 1e8 + 4.9e-5 * WAVE)
     assert optimizer.recommend().std < 1e-6
     assert optimizer.promise() < 1e-5
+
+
+def test_a_stated_range_never_makes_the_scale_smaller_than_the_spread():
+    y = np.array([0.0, 4.0, 8.0])
+    assert Standardization.of(y, (0.0, 100.0)).scale == 25.0
+    assert Standardization.of(y, (0.0, 1.0)).scale == pytest.approx(np.std(y))
+
+
+def test_a_coarse_scale_is_the_nearest_power_of_the_root_of_two_and_squares_stay_finite():
+    for scale in np.geomspace(1e-3, 1e3, 61):
+        coarse = Standardization(0.0, float(scale), False).coarse().scale
+        assert coarse**2 == pytest.approx(2.0 ** np.round(np.log2(scale**2)), rel=1e-12)
+    assert Standardization(0.0, 1e200, False).square == pytest.approx(1e300)
