@@ -73,8 +73,8 @@ class WrenchQuality:
     upper: float
     """Certified upper bound of epsilon; equal to `lower` to rounding, for round cones to 1e-4 of the largest wrench.
 
-    Of perfectly symmetric contacts the bounds are up to 4e-2 apart; epsilon is then the upper one, or in few of them,
-    where no minimum is found, the lower one.
+    Of symmetric contacts, and of almost symmetric ones, the bounds are up to 4e-2 apart; epsilon is then the upper one,
+    the least resistance found from hundreds of directions.
     """
     fallbacks: int
     """0: as planned; else how often rounding spoiled the expansion: a coarser tolerance helps, or the full hull."""

@@ -42,6 +42,15 @@ def least_height(centers, axes, start):
     return minimize(lambda x: x[6], start, constraints=rules, method="SLSQP", options={"ftol": 1e-13})
 
 
+def least_of_all(centers, axes):
+    starts = np.random.default_rng(0).normal(size=(3000, 6))
+    starts /= np.linalg.norm(starts, axis=1)[:, None]
+    heights = np.array([height(start, centers, axes) for start in starts])
+    lowest = np.argsort(heights)[:6]
+    found = [least_height(centers, axes, np.append(starts[i], heights[i])).x[:6] for i in lowest]
+    return min(height(v / np.linalg.norm(v), centers, axes) for v in found)
+
+
 @pytest.mark.parametrize(("c", "torsion"), [(5, 0.0), (9, 0.1), (40, 0.0), (120, 0.05)])
 def test_newton_ends_where_the_expansion_alone_does(c, torsion):
     work, exact, balls, saved = workspace(1 << 17), 0, 0, 0
@@ -77,14 +86,35 @@ def test_symmetric_contacts_are_measured_alike_however_they_are_turned(c, fricti
         centers, axes = round_contacts(CheckedContacts.checked(turned, -turned, friction, torsion=torsion))
         status, epsilon, _, _, u, *_ = expand(NO_WRENCHES, centers, axes, workspace(FACETS))
         assert status == DONE
-        starts = np.random.default_rng(0).normal(size=(3000, 6))
-        starts /= np.linalg.norm(starts, axis=1)[:, None]
-        heights = np.array([height(start, centers, axes) for start in starts])
-        lowest = np.argsort(heights)[:6]
-        found = [least_height(centers, axes, np.append(starts[i], heights[i])).x[:6] for i in lowest]
-        least = min(height(v / np.linalg.norm(v), centers, axes) for v in found)
-        assert epsilon == pytest.approx(least, abs=1e-6)
+        assert epsilon == pytest.approx(least_of_all(centers, axes), abs=1e-6)
         assert height(u, centers, axes) == pytest.approx(epsilon, abs=1e-12)
+
+
+@pytest.mark.parametrize(("friction", "torsion", "length"), [(0.903, 1.0, 1.0), (0.6, 1.0, 2.0), (0.1, 0.3, 0.5)])
+def test_two_soft_fingers_resist_least_at_a_kink(friction, torsion, length):
+    """In the weakest direction one of them touches with a whole disk; lower and upper bounds were told, by chance."""
+    points = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    centers, axes = round_contacts(CheckedContacts.checked(points, -points, friction, length, torsion=torsion))
+    status, epsilon, _, _, u, *_ = expand(NO_WRENCHES, centers, axes, workspace(FACETS))
+    assert status == DONE
+    assert epsilon == pytest.approx(least_of_all(centers, axes), abs=1e-7)
+    assert height(u, centers, axes) == pytest.approx(epsilon, abs=1e-12)
+
+
+@pytest.mark.parametrize("shift", [1e-12, 1e-8, 1e-6])
+def test_epsilon_of_almost_symmetric_contacts_is_near_that_of_symmetric_ones(shift):
+    """It changes by no more than a wrench moves; it fell to the lower bound, by up to 2 % of the largest wrench."""
+    rng = np.random.default_rng(0)
+    for c, friction, torsion in ((5, 0.5, 1.0), (8, 2.6, 0.0), (6, 0.06, 0.1), (10, 2.4, 1.0)):
+        around = 2.0 * np.pi * np.arange(c) / c
+        points = np.column_stack([np.cos(around), np.sin(around), np.zeros(c)])
+        moved = points + shift * rng.uniform(-1.0, 1.0, points.shape)
+        found = []
+        for p in (points, moved):
+            n = -p / np.linalg.norm(p, axis=1)[:, None]
+            contacts = round_contacts(CheckedContacts.checked(p, n, friction, torsion=torsion))
+            found.append(expand(NO_WRENCHES, *contacts, workspace(FACETS))[1])
+        assert found[1] == pytest.approx(found[0], abs=1e-7 + 20.0 * shift)
 
 
 def test_no_direction_near_the_weakest_resists_less():
@@ -109,10 +139,10 @@ def test_wrong_contacts_are_exchanged_or_refused():
     for believed in (decisive, decisive[1:], np.append(decisive[:5], idle)):
         active, weights, near = np.zeros(6, np.int64), np.zeros(6), u + 1e-5
         active[: len(believed)], weights[: len(believed)] = believed, 1.0 / len(believed)
-        if weakest_direction(centers, axes, active, weights, len(believed), near, epsilon, False):
+        if weakest_direction(centers, axes, active, weights, len(believed), near, epsilon, 0.0):
             assert height(near, centers, axes) == pytest.approx(epsilon, abs=1e-9)
     active, weights = np.full(6, idle), np.ones(6)
-    assert not weakest_direction(centers, axes, active, weights, 1, -u, epsilon, False)
+    assert not weakest_direction(centers, axes, active, weights, 1, -u, epsilon, 0.0)
 
 
 def test_linear_systems_equal_numpy():

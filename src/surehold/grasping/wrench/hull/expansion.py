@@ -25,8 +25,8 @@ ROUND_NEAR = 1e-4
 ROUND_GAP = 1e-9
 """Difference of the bounds at which round contacts count as measured without that, as a fraction of the largest wrench.
 
-Perfectly symmetric contacts around an axis, whose weakest directions form a continuum, end at about 1e-3, soft fingers
-at up to 4e-2; the minimum is looked for then, too.
+Symmetric contacts around an axis, whose weakest directions form a continuum, and almost symmetric ones end at about
+1e-3, soft fingers at up to 4e-2; the minimum is looked for then, too.
 """
 _CORNERS = 16  # round contacts of whose rims the first simplex is made, if they span one
 
@@ -37,8 +37,8 @@ def expand(wrenches, centers, axes, work):
 
     Arguments as of `expand_nearest`; the wrenches are not looked at where there are round contacts; the workspace has
     `FACETS`. Return (status, epsilon, lower, upper, u, expansions, facets, fallbacks). The status is DONE if there is a
-    ball, FLAT or OUTSIDE if not, FAILED if rounding spoiled all tries. epsilon is the upper bound, where the bounds
-    close in or h is at a minimum, else the lower one.
+    ball, FLAT or OUTSIDE if not, FAILED if rounding spoiled all tries. epsilon is the upper bound, the
+    least h found; the lower one where rounding spoiled all tries and the last met no ball.
     """
     rounded = len(centers) > 0
     stride = max(1, len(centers) // _CORNERS)
@@ -51,21 +51,20 @@ def expand(wrenches, centers, axes, work):
     best = FAILED, 0.0, 0.0, 0.0, flat, 0, 0, tries
     for fallbacks in range(tries):
         tolerance = ROUND_TOLERANCES[fallbacks] if rounded else TOLERANCES[fallbacks]
-        result = expand_nearest(corners, centers, axes, tolerance, gap, near, False, work)
+        last = rounded and fallbacks == tries - 1
+        result = expand_nearest(corners, centers, axes, tolerance, gap, near, last, work)
         if result[0] == FLAT and stride > 1:
             stride = 1
             corners = rim_points(centers, axes, stride)
-            result = expand_nearest(corners, centers, axes, tolerance, gap, near, False, work)
+            result = expand_nearest(corners, centers, axes, tolerance, gap, near, last, work)
         for more in range(1 if rounded else 2):
             if result[0] == SPENT:
                 room = workspace(MORE_FACETS[more])
                 result = expand_nearest(corners, centers, axes, tolerance, gap, near, rounded, room)
         status, lower, upper, u, expansions, facets = result
         epsilon = upper
-        if status == SPENT and rounded:
-            status, epsilon = DONE, lower  # the bounds hold, they are only wider apart
         zero = tolerance * largest(corners)
-        if status == DONE and lower <= zero:
+        if (status == SPENT and rounded) or (status == DONE and lower <= zero):
             status = OUTSIDE
         if status != FAILED and status != SPENT:
             return status, epsilon, lower, upper, u, expansions, facets, fallbacks

@@ -22,8 +22,8 @@ harmless, whose wrenches are coplanar by the dozen and force Qhull to joggle the
 
 Round contacts have no facets: the bounds close in, ever more slowly. Once they are near each other, the contacts that
 the nearest facet touches are those that are active at a minimum of h, which Newton's method then finds to rounding.
-Where contacts are symmetric and minima form a continuum, the facets do not suffice for that, and it starts from
-thousands of them.
+Where contacts are symmetric, or almost, minima form a continuum or have kinks, and the facets do not suffice for that;
+the lowest place that Newton's method passes from hundreds of them is taken for the minimum then.
 
 s sees a facet if it lies above it by more than a tolerance. Not to see coplanar facets is the placing triangulation,
 which is consistent however degenerate the wrenches are.
@@ -51,7 +51,8 @@ SPENT = 3
 FAILED = 4
 """Rounding made the polytope inconsistent."""
 
-_STARTS = 4096  # of the nearest facets from which a minimum is sought where the facets did not suffice
+_STARTS = 256  # of the nearest facets from which a minimum is sought where the facets did not suffice
+_WIDEST, _NARROWEST = 1e-2, 1e-8  # by how much contacts are rounder in that, as fractions of the largest wrench
 
 
 @njit(cache=True)
@@ -61,11 +62,11 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, near, last, work):
     Arguments: wrenches (m, 6), 7 <= m < 65536; round contacts centers (c, 6) and axes (c, 6, 3), in whose hull the
     wrenches are, which then only span the first simplex; tolerance, below which distances count as zero, gap, the
     difference of the bounds at which to stop early (0 for none), and near, that at which round contacts are looked at
-    by Newton's method (0 for never), all as fractions of the largest wrench; last, whether that is done however far
-    apart the bounds are once the facets are used up; the workspace, with room for all facets that are made. Return
-    (status, lower, upper, u, expansions, facets) with h(u) = upper, u (6,). For DONE and SPENT lower <= epsilon <=
-    upper (where lower is positive), and for FAILED too, before the step that failed; for OUTSIDE upper < 0; for FLAT
-    the bounds mean nothing.
+    by Newton's method (0 for never), all as fractions of the largest wrench; last, whether a minimum is looked for
+    however far apart the bounds are once the facets are used up or rounding spoils them; the workspace, with room for
+    all facets that are made. Return (status, lower, upper, u, expansions, facets) with h(u) = upper, u (6,). For DONE
+    and SPENT lower <= epsilon <= upper (where lower is positive), and for FAILED too, before the step that failed; for
+    OUTSIDE upper < 0; for FLAT the bounds mean nothing.
     """
     m = len(wrenches)
     points = np.empty((m if len(centers) == 0 else m + len(work.vertices) // 16, 6))
@@ -83,7 +84,7 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, near, last, work):
     vertices, neighbors, planes, mark = work.vertices, work.neighbors, work.planes, work.mark
     max_facets = len(vertices)
     u, s, best = np.zeros(6), np.empty(6), np.zeros(6)
-    upper = np.inf
+    upper, failed = np.inf, False
     expansions = 0
     if tolerance == 0.0 or not first_simplex(points, m, tolerance, vertices, neighbors, planes):
         return FLAT, 0.0, 0.0, best, 0, 0
@@ -112,7 +113,7 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, near, last, work):
             near *= 0.1
             for j in range(6):
                 u[j] = planes[nearest, j]
-            found = _minimum(u, h, vertices[nearest], planes[nearest], points, contacts, centers, axes, False)
+            found = _minimum(u, h, vertices[nearest], planes[nearest], points, contacts, centers, axes)
             if found <= upper + tolerance:
                 return DONE, lower, max(found, lower), u, expansions, n_facets
         if added == m:
@@ -132,7 +133,8 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, near, last, work):
             break
         expansions += 1
         if n_horizon < 6 or not _join(added, n_facets, n_horizon, work, step):
-            return FAILED, lower, upper, best, expansions, n_facets
+            failed = True
+            break
         for i in range(n_seen):
             mark[work.seen[i]] = -1
         for new in range(n_facets, n_facets + n_horizon):
@@ -141,30 +143,73 @@ def expand_nearest(wrenches, centers, axes, tolerance, gap, near, last, work):
         n_facets += n_horizon
 
     if last and lower > 0.0:
-        found, some = upper + tolerance, False
-        for k in range(min(_STARTS, heap_size)):  # the first ones of a heap are near, too
+        tried = 0
+        for k in range(heap_size):  # the first ones of a heap are near, too
             facet = work.ids[k]
             if mark[facet] < 0:
                 continue
+            tried += 1
+            if tried > _STARTS:
+                break
             for j in range(6):
                 u[j] = planes[facet, j]
-            h = support(u, points, 0, centers, axes, s)[2]
-            minimum = _minimum(u, h, vertices[facet], planes[facet], points, contacts, centers, axes, True)
-            if minimum < found:
-                found, some = minimum, True
+            corners = vertices[facet]
+            found = _descended(u, upper, scale, corners, planes[facet], points, contacts, centers, axes)
+            if found < upper:
+                upper = found
                 for j in range(6):
                     best[j] = u[j]
-        if some:
-            return DONE, lower, max(found, lower), best, expansions, n_facets
-    return SPENT, lower, upper, best, expansions, n_facets
+        return DONE, lower, max(upper, lower), best, expansions, n_facets
+    return FAILED if failed else SPENT, lower, upper, best, expansions, n_facets
 
 
 @njit(cache=True)
-def _minimum(u, h, corners, plane, points, contacts, centers, axes, damped):
-    """Return the minimum of h near u (6,), which is moved there, or infinity if none is found.
+def _minimum(u, h, corners, plane, points, contacts, centers, axes):
+    """Return the minimum of h near u (6,), which is moved there, or infinity if none is found."""
+    active, shares = np.empty(6, np.int64), np.zeros(6)
+    n, all_known = _active(corners, plane, points, contacts, active, shares)
+    if n == 0 or not all_known or not weakest_direction(centers, axes, active, shares, n, u, h, 0.0):
+        return np.inf
+    return support(u, points, 0, centers, axes, np.empty(6))[2]
 
-    Active are the round contacts of the facet's corners, with the barycentric weights of its point nearest to the
-    origin.
+
+@njit(cache=True)
+def _descended(u, least, scale, corners, plane, points, contacts, centers, axes):
+    """Return the lowest h on the way from u (6,) to a minimum, and move u there; infinity if none is below `least`.
+
+    The minimum is followed from rounder contacts to those that are: where a contact touches with a whole disk h has a
+    kink, into which Newton's method does not find.
+    """
+    active, shares, s = np.empty(6, np.int64), np.zeros(6), np.empty(6)
+    n, _ = _active(corners, plane, points, contacts, active, shares)
+    if n == 0:
+        return np.inf
+    best, lowest, width = u.copy(), np.inf, _WIDEST
+    h = support(u, points, 0, centers, axes, s)[2]
+    while width > _NARROWEST:
+        weakest_direction(centers, axes, active, shares, n, u, h, width * scale)
+        length = 0.0
+        for j in range(6):
+            length += u[j] * u[j]
+        if not length > 0.0:
+            break
+        for j in range(6):
+            u[j] /= np.sqrt(length)
+        h = support(u, points, 0, centers, axes, s)[2]
+        if h < min(least, lowest):
+            lowest = h
+            best[:] = u
+        width *= 0.5
+    u[:] = best
+    return lowest
+
+
+@njit(cache=True)
+def _active(corners, plane, points, contacts, active, shares):
+    """Find the round contacts of a facet's corners; return how many, and whether that of each corner is known.
+
+    `active` (6,) gets their numbers and `shares` (6,) the barycentric weights of the facet's point nearest to the
+    origin. There are none if the facet is too flat for them.
     """
     system, weights = np.empty((6, 6)), np.empty(6)
     for j in range(6):
@@ -172,13 +217,13 @@ def _minimum(u, h, corners, plane, points, contacts, centers, axes, damped):
         for k in range(6):
             system[j, k] = points[corners[k], j]
     if not solve(system, weights, 6):
-        return np.inf
-    active, shares = np.empty(6, np.int64), np.zeros(6)
-    n = 0
+        return 0, False
+    n, all_known = 0, True
     for k in range(6):
         contact = contacts[corners[k]]
         if contact < 0:
-            return np.inf
+            all_known = False
+            continue
         i = 0
         while i < n and active[i] != contact:
             i += 1
@@ -186,9 +231,7 @@ def _minimum(u, h, corners, plane, points, contacts, centers, axes, damped):
             active[n] = contact
             n += 1
         shares[i] += weights[k]
-    if not weakest_direction(centers, axes, active, shares, n, u, h, damped):
-        return np.inf
-    return support(u, points, 0, centers, axes, np.empty(6))[2]
+    return n, all_known
 
 
 @njit(cache=True)

@@ -15,7 +15,9 @@ and then sum_i l_i = 1, as u.s_i = h_i: as many equations as unknowns u, e, l_i.
 negative is left out, one whose h_i is above e is taken in, and Newton's method starts again.
 
 Symmetric contacts have continua of minima, and of weights, in which the equations F are singular. Damped steps, those
-of Levenberg and Marquardt with |F| as the damping, get there as fast (Yamashita and Fukushima 2001).
+of Levenberg and Marquardt with |F| as the damping, get there as fast (Yamashita and Fukushima 2001). And h may be least
+where B_i'u = 0, a kink of h_i. To each contact a ball of radius `width` is added, h_i = a_i.u + sqrt(|B_i'u|^2 +
+width^2 |u|^2), which has none and is higher by no more than the width.
 """
 
 import numpy as np
@@ -28,21 +30,22 @@ __all__ = ["solve", "weakest_direction"]
 _MOST_ACTIVE = 6
 _ROUNDS = 8  # of changes of the active contacts
 _STEPS = 12  # of Newton's method in each
-_DAMPED_STEPS = 60
+_DAMPED_STEPS = 20  # with rounder contacts
 _SMALL = 1e-12  # step of a direction at which it has converged
 
 
 @njit(cache=True)
-def weakest_direction(centers, axes, active, weights, n_active, u, e, damped):
+def weakest_direction(centers, axes, active, weights, n_active, u, e, width):
     """Return whether Newton's method converged to a minimum near u (6,), which is overwritten with where it is.
 
     `active` (6,) holds the numbers of the first n_active contacts believed to be active and `weights` (6,) their
-    weights; both are overwritten. e is a guess of the minimum. `damped` tells whether minima may form a continuum.
+    weights; both are overwritten. e is a guess of the minimum. Where minima may form a continuum or have kinks,
+    contacts are taken to be rounder by a `width` above 0, and steps are damped.
     """
     n = 13
     system, right = np.empty((n, n + 1)), np.empty(n)
     for _ in range(_ROUNDS):
-        if not _newton(centers, axes, active, weights, n_active, u, e, system, right, damped):
+        if not _newton(centers, axes, active, weights, n_active, u, e, system, right, width):
             return False
         least = 0
         for i in range(1, n_active):
@@ -60,7 +63,7 @@ def weakest_direction(centers, axes, active, weights, n_active, u, e, damped):
             h = support_of_contact(u, centers, axes, i)
             if h > highest:
                 highest, other = h, i
-        if other < 0 or highest - e <= _SMALL:
+        if other < 0 or highest - e <= _SMALL + 2.0 * width:
             return True
         for i in range(n_active):
             if active[i] == other:
@@ -73,11 +76,11 @@ def weakest_direction(centers, axes, active, weights, n_active, u, e, damped):
 
 
 @njit(cache=True)
-def _newton(centers, axes, active, weights, n_active, u, e, system, right, damped):
+def _newton(centers, axes, active, weights, n_active, u, e, system, right, width):
     """Solve the equations for a fixed set of active contacts, u and weights in place; False if they do not converge."""
     size = 7 + n_active
     z = np.empty(3)
-    for _ in range(_DAMPED_STEPS if damped else _STEPS):
+    for _ in range(_DAMPED_STEPS if width > 0.0 else _STEPS):
         for i in range(size):
             right[i] = 0.0
             for j in range(size):
@@ -97,13 +100,13 @@ def _newton(centers, axes, active, weights, n_active, u, e, system, right, dampe
                 for j in range(6):
                     z[k] += u[j] * axes[a, j, k]
                 length += z[k] * z[k]
-            length = np.sqrt(length)
+            length = np.sqrt(length + square * width * width)
             if not length > 0.0:
                 return False
             for k in range(3):
                 z[k] /= length
             for j in range(6):
-                point = centers[a, j]
+                point = centers[a, j] + width * width / length * u[j]
                 for k in range(3):
                     point += axes[a, j, k] * z[k]
                 system[j, row] = system[row, j] = point
@@ -114,11 +117,18 @@ def _newton(centers, axes, active, weights, n_active, u, e, system, right, dampe
             for p in range(6):
                 along = system[p, row] - centers[a, p]
                 for q in range(6):
-                    total = 0.0
+                    total = width * width if p == q else 0.0
                     for k in range(3):
                         total += axes[a, p, k] * axes[a, q, k]
                     system[p, q] += weight * (total - along * (system[q, row] - centers[a, q])) / length
-        if damped:
+        if width > 0.0:
+            residual = 0.0
+            for i in range(size):
+                residual += right[i] * right[i]
+            if residual < (1e-2 * width) ** 2:
+                for j in range(6):
+                    u[j] /= np.sqrt(square)
+                return True
             system, right = _damped(system, right, size)
         if not solve(system, right, size):
             return False
