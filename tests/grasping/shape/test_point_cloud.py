@@ -116,6 +116,23 @@ def test_a_hand_that_is_most_of_the_cloud_is_refused(mug):
 def test_a_camera_among_the_points_is_refused(mug):
     with pytest.raises(InputError, match="lies among the points"):
         cleaned(mug, camera=mug.mean(axis=0))
+    with pytest.raises(InputError, match="lies among the points"):
+        cleaned(mug, camera=mug[0])  # it ended in a traceback
+    with pytest.raises(InputError, match="lies among the points"):
+        cleaned(mug, camera=mug[0] + 0.005 * CAMERA / np.linalg.norm(CAMERA))
+
+
+def test_pixels_without_a_distance_lie_in_the_camera_and_say_nothing(mug):
+    seen = mug - CAMERA
+    alone = cleaned(seen, camera=np.zeros(3))
+    cloud = cleaned(np.vstack([np.zeros((70_000, 3)), seen]), camera=np.zeros(3))
+    np.testing.assert_array_equal(cloud.points, alone.points)
+    assert "70,000 points lie in the camera and were left out" in cloud.notes
+
+
+def test_a_camera_in_another_unit_is_told(mug):
+    assert any("m away: give it in the unit" in note for note in cleaned(mug, camera=1000.0 * CAMERA).notes)
+    assert not any("m away" in note for note in cleaned(mug, camera=CAMERA).notes)
 
 
 def test_ten_million_points_are_thinned_before_anything_else():

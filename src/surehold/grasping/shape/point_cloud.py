@@ -1,9 +1,9 @@
 """A point cloud made ready to learn a shape from: cleaned, thinned, with normals and noise.
 
-In this order: points that are not finite are dropped; of many an even part is taken, so that what follows costs the
-same for ten million; the unit is checked; a table under the object is found and taken off; points far from their
-neighbors are dropped, and groups of a few points that lie apart; a second object is refused; the rest is thinned to
-cubes of equal size, whose means have less noise; the noise is measured as the scatter about local planes.
+In this order: points that are not finite, or in the camera, are dropped; of many an even part is taken, so that what
+follows costs the same for ten million; the unit is checked; a table under the object is found and taken off; points far
+from their neighbors are dropped, and groups of a few points that lie apart; a second object is refused; the rest is
+thinned to cubes of equal size, whose means have less noise; the noise is measured as the scatter about local planes.
 Distances to neighbors are those of SciPy's k-d tree.
 """
 
@@ -29,6 +29,7 @@ _LARGEST, _SMALLEST = 0.6, 0.005  # extent of what a hand can grasp [m]
 _NEIGHBORS: Final = 12
 _LEAST_NOISE: Final = 0.0003  # of a thinned point [m]
 _APART: Final = 0.012  # gap between two objects [m]
+_NEAREST, _FARTHEST = 0.01, 10.0  # of a camera that sees an object of a hand's size [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +87,11 @@ def cleaned(
     if not np.all(finite):
         notes.append(f"{int(np.sum(~finite)):,} of {len(points):,} points are not finite and were left out")
         points = points[finite]
+    if camera is not None:
+        empty = np.linalg.norm(points[:, :3] - camera, axis=1) < 1e-6
+        if np.any(empty):  # as depth cameras write pixels without a distance
+            notes.append(f"{int(np.sum(empty)):,} points lie in the camera and were left out")
+            points = points[~empty]
     _enough(points, "finite ")
     if len(points) > _MOST_READ:
         count, points = len(points), _even_part(points)
@@ -101,11 +107,16 @@ def cleaned(
     points = _largest_object(points, camera, notes)
     _enough(points, "clean ")
     size = np.ptp(points[:, :3], axis=0)
-    if camera is not None and np.all((camera > points[:, :3].min(axis=0)) & (camera < points[:, :3].max(axis=0))):
-        raise InputError(
-            f"the camera {np.round(camera, 4).tolist()} m lies among the points of the object; give where it stood, in "
-            "the file's unit and frame, or leave it out."
-        )
+    if camera is not None:
+        inside = np.all((camera > points[:, :3].min(axis=0)) & (camera < points[:, :3].max(axis=0)))
+        away = float(np.linalg.norm(points[:, :3] - camera, axis=1).min())
+        if inside or away < _NEAREST:
+            raise InputError(
+                f"the camera {np.round(camera, 4).tolist()} m lies among the points of the object; give where it "
+                "stood, in the file's unit and frame, or leave it out."
+            )
+        if away > _FARTHEST:
+            notes.append(f"the camera is {away:,.0f} m away: give it in the unit and frame of the file")
     spread = np.linalg.svd(points[:, :3] - points[:, :3].mean(axis=0), compute_uv=False) / np.sqrt(len(points))
     if spread[1] < max(0.02 * spread[0], 0.0005):
         raise InputError(
