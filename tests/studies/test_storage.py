@@ -397,3 +397,26 @@ def test_a_study_is_found_when_its_program_has_gone_to_another_folder(file, tmp_
     assert study.ask().id == 1
     assert not list(Path().iterdir())
     study.close()
+
+
+@pytest.mark.filterwarnings("ignore:.*use of fork")  # Python 3.12 in a process with threads
+@pytest.mark.parametrize("url", ["journal.log", "sqlite:///study.db"])
+def test_forked_processes_share_an_open_study(url, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    study = RobotStudy.create("mug", StudySettings(SETTINGS.space, optimizer={"n_initial": 8}), url)
+    study.tell(study.ask().id, 0.0)  # what the children inherit has been used
+    children = []
+    for value in (1.0, 2.0):
+        child = os.fork()
+        if not child:
+            try:
+                for _ in range(2):
+                    study.tell(study.ask().id, value)
+            except BaseException:
+                os._exit(1)
+            os._exit(0)
+        children.append(child)
+    assert [os.waitpid(child, 0)[1] for child in children] == [0, 0]
+    trials = study.trials()
+    assert sorted(trial.values[0] for trial in trials) == [0.0, 1.0, 1.0, 2.0, 2.0]
+    assert len({trial.params["x"] for trial in trials}) == 5

@@ -41,7 +41,7 @@ class Journal(BaseJournalBackend):
 
     def __init__(self, path: Path):
         self._path = path
-        self._lock = file_lock(path.with_name(f"{path.name}.lock"))
+        self._lock_path = path.with_name(f"{path.name}.lock")
         self._forget()
 
     def _forget(self) -> None:
@@ -87,7 +87,7 @@ class Journal(BaseJournalBackend):
     @contextmanager
     def _locked(self) -> Iterator[None]:
         """Hold the lock of the writers during the block, behind whole lines."""
-        with self._lock:
+        with file_lock(self._lock_path):  # a new one: an object that was made before a fork locks nothing behind it
             self._mend()
             yield
 
