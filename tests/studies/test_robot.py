@@ -362,6 +362,16 @@ def test_a_trial_that_kills_every_worker_fails(robot):
     assert "workers died of it" in robot.trials()[0].user_attrs["surehold:note"]
 
 
+def test_a_worker_that_asks_again_is_no_further_one(robot):
+    for _ in range(6):
+        assert robot.ask("arm", lifetime=60.0).id == 0
+    assert status(robot)["pending"][0]["attempts"] == 1
+    robot.ask("arm", lifetime=0.0)
+    time.sleep(0.002)
+    assert robot.ask("leg", lifetime=60.0).id == 0
+    assert status(robot)["pending"][0]["attempts"] == 2
+
+
 def test_enqueued_trials_come_first(robot):
     robot.study.enqueue_trial({"dx": 0.01, "dy": 0.02})
     robot.study.enqueue_trial({"dx": -0.01})

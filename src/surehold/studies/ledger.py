@@ -32,6 +32,7 @@ __all__ = [
     "UnknownTrial",
     "abandoned",
     "answer_of",
+    "attempts_of_next",
     "checked_value",
     "holder_of",
     "waits",
@@ -64,7 +65,7 @@ class Holder(NamedTuple):
     until: float | None
     """seconds since 1970 until which the holder counts as alive; None: forever"""
     attempts: int
-    """times that the trial was handed out, but for those after which it was let go"""
+    """holders that the trial was handed out to, one after the other's death; those that let it go do not count"""
 
     @classmethod
     def from_now(cls, name: str | None, lifetime: float | None, attempts: int = 1) -> "Holder":
@@ -252,6 +253,11 @@ def abandoned(trial: FrozenTrial, now: float) -> bool:
 def waits(trial: FrozenTrial, now: float) -> bool:
     """Tell whether a trial waits to be handed out, for the first time or again."""
     return trial.state == TrialState.WAITING or (abandoned(trial, now) and _may_be_made(trial))
+
+
+def attempts_of_next(trial: FrozenTrial, now: float) -> int:
+    """Return the attempts of a trial that is handed out again: one that a living holder asks for again is the same."""
+    return max(_attempts(trial) + abandoned(trial, now), 1)
 
 
 def _attempts(trial: FrozenTrial) -> int:

@@ -17,7 +17,7 @@ from optuna.trial import FrozenTrial, TrialState
 from surehold.errors import InputError, SureholdError, unknown_name
 from surehold.optimization.limits import checked_outputs
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of
-from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Told, checked_value, holder_of, waits
+from surehold.studies.ledger import BEHIND, HOLDER, NOTE, PROMISE, Holder, Told, attempts_of_next, checked_value, waits
 from surehold.studies.opened import OpenedStudy
 from surehold.studies.recommendation import StudyRecommendation, find_recommendation, written
 from surehold.studies.storage import StorageFailure
@@ -89,9 +89,7 @@ class RobotStudy(OpenedStudy):
                 trials = self._ledger.trials()
                 trial = self._ledger.held(trials, worker) or self._ledger.orphan(trials, now)
                 if trial is not None:
-                    before = holder_of(trial)
-                    attempts = 1 if before is None else before.attempts + 1
-                    self._ledger.hold(trial, Holder.from_now(worker, lifetime, attempts))
+                    self._ledger.hold(trial, Holder.from_now(worker, lifetime, attempts_of_next(trial, now)))
                     return self._asked(trial, True)
             promise = self._refuse_stopped(trials, now)
             if any(t.state == TrialState.WAITING for t in trials):  # enqueued by Optuna's means
