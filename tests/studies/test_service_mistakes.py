@@ -58,6 +58,21 @@ def test_a_body_that_no_json_can_be_made_of(client, body):
     assert (answer.status_code, "cannot be read as JSON: too deep" in answer.json()["detail"]) == (400, True)
 
 
+@pytest.mark.parametrize(
+    ("call", "body", "name"),
+    [
+        ("tell", b'{"id": 0, "value": 1, "value": 2}', "value"),
+        ("tell", b'{"id": 0, "value": 1, "reached": {"dx": 0.01, "dx": 0.02}}', "dx"),
+        ("add", b'{"parameters": {"dx": 0.01}, "value": 1, "parameters": {"dx": 0.02}}', "parameters"),
+    ],
+)
+def test_a_name_that_stands_twice_is_refused(client, call, body, name):
+    answer = client.post(f"/studies/arm/{call}", content=body, headers={"Content-Type": JSON})
+    assert answer.status_code == 400
+    assert answer.json()["detail"] == f"the body names '{name}' twice; send each name once."
+    assert client.get("/studies/arm/trials").json() == []
+
+
 @pytest.mark.parametrize("value", ["NaN", '"abc"', "[1]"])
 def test_a_wrong_value_is_told_once_what_the_study_takes(client, outcome, value):
     detail = said(client, "tell", f'{{"id": 3, "value": {value}}}'.encode())

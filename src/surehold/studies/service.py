@@ -21,6 +21,7 @@ from surehold.errors import InputError
 from surehold.studies import service_messages as wire
 from surehold.studies.prepared import Prepared
 from surehold.studies.robot import RobotStudy
+from surehold.studies.service_bodies import BodyRoute
 from surehold.studies.service_guard import PATIENCE, Guard, Impatience
 from surehold.studies.service_mistakes import say_what_is_wrong
 from surehold.studies.status import rows, status
@@ -112,6 +113,7 @@ def service(study: RobotStudy, token: str, patience: float = PATIENCE) -> FastAP
         responses=problems,
         lifespan=life,
     )
+    app.router.route_class = BodyRoute
     app.add_middleware(Guard, token=token, patience=patience)
     say_what_is_wrong(app, study.name, study.settings.optimizer.get("outcome") == "success")
     writing = threading.Lock()  # one recommendation is written at a time

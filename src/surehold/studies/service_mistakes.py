@@ -14,6 +14,7 @@ from starlette.exceptions import HTTPException
 from surehold.errors import InputError, SureholdError
 from surehold.studies.ledger import AnswerRefused, UnknownTrial
 from surehold.studies.robot import NothingToAsk
+from surehold.studies.service_bodies import NamedTwice
 from surehold.studies.storage import StorageFailure
 from surehold.studies.wrong_fields import example, shown, wrong_field
 
@@ -41,7 +42,7 @@ def say_what_is_wrong(app: FastAPI, study: str, counted: bool) -> None:
     @app.exception_handler(HTTPException)
     def unserved(request: Request, error: HTTPException) -> JSONResponse:
         path, detail = request.scope["path"], error.detail
-        if error.status_code == 400:  # before it is known which call it is; FastAPI says that there was an error
+        if error.status_code == 400 and not isinstance(error, NamedTwice):  # FastAPI says that there was an error
             detail = "the body cannot be read as JSON: too deep, a number of too many digits, or no text in UTF-8."
         elif error.status_code == 404 and detail == "Not Found":
             detail = _not_found(path, study, [route for route in app.routes if isinstance(route, APIRoute)])
