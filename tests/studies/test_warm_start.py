@@ -5,9 +5,11 @@ import math
 from pathlib import Path
 
 import pytest
+from optuna.distributions import CategoricalDistribution
 
 from surehold.cli import run
 from surehold.errors import InputError
+from surehold.studies.history import REACHED
 from surehold.studies.robot import RobotStudy
 from surehold.studies.search_space import SearchSpace
 from surehold.studies.settings import StudySettings
@@ -168,3 +170,25 @@ def test_names_that_a_spreadsheet_would_compute_are_quoted_in_the_header_and_rea
     other = RobotStudy.create("other", StudySettings(space), "other.log")
     import_trials(other, trials_of_csv("sums.csv", {name: name for name in space.distributions}))
     assert [(trial.params, trial.value) for trial in other.trials()] == [({"=dx": 0.01, "-dy": 0.5}, 0.7)]
+
+
+@pytest.mark.parametrize(
+    "choices",
+    [
+        (None, "null", '"null"', "", "  ", "a", "a ", "b\nc", "d\n", "=e", "'=e"),
+        (1, "1", 0.5, "0.50", "None"),
+        (True, "True", "true", False),
+    ],
+)
+def test_every_choice_comes_back_from_an_export(here, choices):
+    space = SearchSpace({"grip": CategoricalDistribution(choices), "dx": (0.0, 1.0)})
+    study = RobotStudy.create("grips", StudySettings(space), "grips.log")
+    for k, choice in enumerate(choices):
+        study.add({"grip": choice, "dx": 0.5}, k, reached={"grip": choices[k - 1]})
+    RobotStudy.create("again", StudySettings(space), "again.log").close()
+    assert run(["study", "export", "grips", "--storage", "grips.log", "--out", "grips.csv"]) == 0
+    assert run(["study", "import", "again", "grips.csv", "--storage", "again.log"]) == 0
+    back = RobotStudy.open("again", "again.log").trials()
+    assert [repr(trial.params["grip"]) for trial in back] == [repr(choice) for choice in choices]
+    reached = [trial.user_attrs[REACHED]["grip"] for trial in back]
+    assert [repr(choice) for choice in reached] == [repr(choices[k - 1]) for k in range(len(choices))]

@@ -129,6 +129,7 @@ def import_trials(
     """Take trials over that were made before, from a CSV file or another study; each is taken once."""
     from surehold.errors import InputError, unknown_name
     from surehold.studies import warm_start
+    from surehold.studies.choice_cells import ChoiceCells
     from surehold.studies.parameter_text import parse_assignments
 
     if bool(file) == bool(study):
@@ -141,7 +142,7 @@ def import_trials(
         names[parameter] = column
     outputs = [limit.name for limit in target.limits]
     if file:
-        found = warm_start.trials_of_csv(file, names, value, outputs)
+        found = warm_start.trials_of_csv(file, names, value, outputs, ChoiceCells(target.settings.space).read)
     else:
         former = warm_start.former_study(study, source, target)
         found = warm_start.trials_of_study(former, names, target.settings.direction, outputs)

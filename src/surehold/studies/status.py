@@ -4,11 +4,13 @@ import csv
 import io
 import json
 import time
+from collections.abc import Callable
 from typing import Any
 
 from optuna.trial import FrozenTrial, TrialState
 
 from surehold.store.csv_cells import written_cell
+from surehold.studies.choice_cells import ChoiceCells
 from surehold.studies.export_columns import columns_of
 from surehold.studies.history import EXECUTIONS, OUTPUTS, REACHED, parameters_of, value_of
 from surehold.studies.ledger import NOTE, VETOED, holder_of, waits
@@ -56,10 +58,18 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
     Of a study about success also "of": of how many executions the value is the share that succeeded. The names are
     those of `export_columns`.
     """
+    return _rows(study, lambda name, value: value)
+
+
+def _rows(study: RobotStudy, written: Callable[[str, Any], Any]) -> list[dict[str, Any]]:
+    """Return the rows, in which parameters that a trial has are as `written` returns them, by name and value."""
     found, now = [], time.time()
     columns = columns_of(study.settings)
     for trial in study.trials():
-        parameters, reached = parameters_of(trial), trial.user_attrs.get(REACHED, {})
+        parameters, reached = (
+            {name: written(name, value) for name, value in there.items()}
+            for there in (parameters_of(trial), trial.user_attrs.get(REACHED, {}))
+        )
         outputs, holder = trial.user_attrs.get(OUTPUTS, {}), holder_of(trial)
         found.append(
             {
@@ -80,12 +90,16 @@ def rows(study: RobotStudy) -> list[dict[str, Any]]:
 
 
 def to_csv(study: RobotStudy) -> str:
-    """Return the trials as CSV with a header; an empty field is nothing, texts as in `csv_cells.written_cell`."""
+    """Return the trials as CSV with a header; an empty field is nothing, texts as in `csv_cells.written_cell`.
+
+    Choices are as in `choice_cells`.
+    """
     text = io.StringIO()
     columns = columns_of(study.settings).all
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(map(written_cell, columns))
-    writer.writerows([written_cell(row[column]) for column in columns] for row in rows(study))
+    found = _rows(study, ChoiceCells(study.settings.space).written)
+    writer.writerows([written_cell(row[column]) for column in columns] for row in found)
     return text.getvalue()
 
 

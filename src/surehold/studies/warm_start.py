@@ -6,7 +6,7 @@ All rows are checked before the first is stored. A trial that an earlier import 
 import csv
 import io
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -70,7 +70,11 @@ class Imported(NamedTuple):
 
 
 def trials_of_csv(
-    path: str, names: Mapping[str, str], value: str = "value", outputs: Iterable[str] = ()
+    path: str,
+    names: Mapping[str, str],
+    value: str = "value",
+    outputs: Iterable[str] = (),
+    read: Callable[[str, str], Any] = lambda name, cell: cell,
 ) -> list[FormerTrial]:
     """Return the trials of a CSV file with a header.
 
@@ -84,6 +88,8 @@ def trials_of_csv(
         about success, of how many executions the value is the share that succeeded.
     outputs
         Names of further outputs, in the columns output_NAME or NAME; where they are empty, they were not measured.
+    read
+        What a parameter's cell says, by name and cell; of choices as they are exported `ChoiceCells.read`.
 
     Raises
     ------
@@ -117,11 +123,11 @@ def trials_of_csv(
             continue
         told = cell_text((row[value] or "").strip())
         reached = {
-            name: cell_text(row[f"reached_{name}"].strip())
+            name: read(name, cell_text(row[f"reached_{name}"].strip()))
             for name in names
             if (row.get(f"reached_{name}") or "").strip()
         }
-        parameters = {name: cell_text((row[column] or "").strip()) for name, column in names.items()}
+        parameters = {name: read(name, cell_text((row[column] or "").strip())) for name, column in names.items()}
         failed = state in _FAILED or not told
         why = f"has state {state}" if state in _FAILED else "has no value"
         where = f"{Path(path).name}, line {line}"
