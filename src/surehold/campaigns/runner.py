@@ -1,5 +1,6 @@
 """Making the runs of a plan: worker processes or a cluster, one writer, and nothing lost but the runs in flight."""
 
+import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -17,6 +18,7 @@ from surehold.campaigns.single_run import run_once
 from surehold.campaigns.table import Records, opened
 from surehold.errors import InputError, SureholdError, unknown_name
 from surehold.extras import require
+from surehold.store.parent import end_with
 
 __all__ = ["Progress", "checked_backend", "run_campaign"]
 
@@ -216,7 +218,9 @@ def _pool(kind: str, address: str, workers: int) -> Iterator[tuple[Executor, Cal
     if kind == "loky":
         from joblib.externals.loky import ProcessPoolExecutor
 
-        executor = ProcessPoolExecutor(workers, env=dict.fromkeys(_THREADS, "1"))
+        executor = ProcessPoolExecutor(
+            workers, initializer=end_with, initargs=(os.getpid(),), env=dict.fromkeys(_THREADS, "1")
+        )
         try:
             yield executor, lambda: workers
         finally:  # also of a generator that is left: runs in flight are lost

@@ -7,6 +7,7 @@ Epsilon of round cones, the default, is measured in compiled code that lets othe
 nothing is sent. The other measures are Python's, which runs in one thread at a time: workers are processes.
 """
 
+import os
 import pickle
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,6 +25,7 @@ from surehold.grasping.poses import FARTHEST, Pose, check_rotations
 from surehold.grasping.simulator import Simulator
 from surehold.grasping.trial_loop import UNDECIDED, run_trials
 from surehold.grasping.wrench.ellipsoids import RoundCones
+from surehold.store.parent import end_with
 
 __all__ = ["GraspBatch", "grasp_batch"]
 
@@ -173,7 +175,9 @@ def _outcomes_in_processes(
 
     simulator.warm_up()  # compiled once, read from the cache by the workers
     content = pickle.dumps(simulator)
-    pool = get_reusable_executor(int(workers), timeout=_IDLE, env={"OPENBLAS_NUM_THREADS": "1"})
+    pool = get_reusable_executor(
+        int(workers), timeout=_IDLE, initializer=end_with, initargs=(os.getpid(),), env={"OPENBLAS_NUM_THREADS": "1"}
+    )
     chunks = [(poses[part], postures[part].copy()) for part in parts]
     return np.concatenate(list(pool.map(partial(_outcomes_there, content), chunks)))
 

@@ -1,5 +1,6 @@
 """Trying inputs: a user's function called here, one trial after the other, or in processes of its own."""
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from time import perf_counter
 from types import TracebackType
@@ -13,6 +14,7 @@ from surehold.optimization.optimizer import Optimizer
 from surehold.optimization.points import numbers_of
 from surehold.optimization.trials import AskedTrial
 from surehold.optimization.values import LARGEST
+from surehold.store.parent import end_with
 from surehold.store.uninterrupted import raise_interruption
 
 __all__ = ["Evaluation", "evaluate", "in_processes", "one_by_one"]
@@ -114,7 +116,7 @@ def in_processes(optimizer: Optimizer, f: Callable[..., Any], n_trials: int, n_j
 
     from joblib.externals.loky import ProcessPoolExecutor
 
-    pool = ProcessPoolExecutor(max_workers=n_jobs)
+    pool = ProcessPoolExecutor(n_jobs, initializer=end_with, initargs=(os.getpid(),))
     running: dict[Future[tuple[float, str, Mapping[str, Any]]], tuple[AskedTrial, float]] = {}
     begun = 0
     try:

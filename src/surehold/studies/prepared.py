@@ -12,6 +12,7 @@ As long as nobody has told anything since the proposal was made, it is the point
 """
 
 import logging
+import os
 import threading
 import time
 from collections import deque
@@ -101,7 +102,7 @@ class Prepared:
         if self._child is None:
             # Not a fork: this process has threads.
             self._child = ProcessPoolExecutor(1, get_context("spawn"))
-            self._ready = self._child.submit(begin, self._study.settings.to_json())
+            self._ready = self._child.submit(begin, self._study.settings.to_json(), os.getpid())
         return self._ready is not None and self._ready.done()
 
     def _fill(self, trials: Sequence[FrozenTrial], number: int, told: int) -> None:

@@ -1,15 +1,13 @@
 """What the child process does that makes proposals ahead (`prepared`): one optimizer, one proposal after the other."""
 
-import os
 import signal
-import threading
 from collections.abc import Mapping
-from multiprocessing import parent_process
 from typing import Any
 
 import numpy as np
 
 from surehold.optimization.optimizer import Optimizer
+from surehold.store.parent import end_with
 from surehold.studies.history import History
 from surehold.studies.sampler import Sampler
 from surehold.studies.settings import StudySettings
@@ -21,11 +19,11 @@ _optimizer: Optimizer | None = None
 _made: dict[int, dict[str, Any]] = {}  # parameters of proposals by the number of their trial
 
 
-def begin(settings: Mapping[str, Any]) -> None:
-    """Be ready for the study with these settings (`StudySettings.to_json`); end when the process that asks does."""
+def begin(settings: Mapping[str, Any], parent: int) -> None:
+    """Be ready for the study with these settings (`StudySettings.to_json`); end when the process `parent` does."""
     global _study
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is meant for the service, which ends this process
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with(parent)
     read = StudySettings.from_json(settings)
     _study = read, read.sampler()
 
@@ -48,10 +46,3 @@ def propose(number: int) -> dict[str, Any]:
     assert _optimizer is not None
     _made[number] = _study[0].space.complete(_optimizer.ask_trial(number=number).parameters)
     return _made[number]
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(0)
