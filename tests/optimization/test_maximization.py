@@ -59,7 +59,7 @@ def test_a_function_that_raises_is_a_failed_trial():
         (np.inf, "inf"),
         ([1.0, 2.0], r"shape \(2,\)"),
         ("good", "ValueError"),
-        (None, "returned None.*lack a return"),
+        (None, "returned None.*return missing"),
         (np.ma.masked, "masked"),
     ],
 )
