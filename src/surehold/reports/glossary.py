@@ -26,7 +26,7 @@ _QUALITIES: Final = {
     ),
     "balance": "How well the contacts take over six pushes along the object's axes, from 0 to 1.",
 }
-_INSIDE: Final = "The open hand overlapped the object there, so it could not close: deeper is lower."
+_INSIDE: Final = "the open hand overlapped the object there, so it could not close: deeper is lower."
 #: Types of grasp of the iCub's hands, whose posture turns the thumb; a learned synergy has a name of its own.
 _TURN_THE_THUMB: Final = ("power", "pinch", "tripod")
 
@@ -60,9 +60,8 @@ def glossary(report: RunReport) -> list[tuple[str, str]]:
     quality, contact = str(report.settings.get("quality", "")), report.settings.get("contact")
     if quality in _QUALITIES and not report.counted:
         words.append((f"quality ({quality})", _QUALITIES[quality]))
-        open_border = "Some push is not resisted: the more is missing, the lower. Or the status is a collision: "
-        signed = quality == "signed_epsilon"
-        words.append(("below 0", open_border + _INSIDE[0].lower() + _INSIDE[1:] if signed else _INSIDE))
+        not_closed = "Some push is not resisted: the more is missing, the lower. Or the status is a collision: "
+        words.append(("below 0", not_closed + _INSIDE if quality == "signed_epsilon" else _INSIDE.capitalize()))
     if report.quality_name.endswith(" shapes"):
         words.append(("over shapes", "Mean over equally likely shapes, all of which agree with what was measured."))
     if contact == "graded":
