@@ -10,8 +10,11 @@ from surehold.optimization.surrogates.gaussian_process.kernels import (
     along,
     correlation,
     correlation_and_factor,
+    correlations,
     kernel_number,
-    self_correlation,
+    rectangle,
+    transposed,
+    triangle,
     two_scale_slopes,
 )
 
@@ -87,12 +90,28 @@ def test_equal_to_scikit_learn(name, points):
 
 
 @pytest.mark.parametrize("name", REFERENCE)
-def test_self_correlation_is_the_cross_correlation(name, points):
+def test_a_triangle_holds_the_correlations_of_points_with_those_before_them(name, points):
     X, _, scales = points
-    out = np.empty((9, 9))
-    self_correlation(kernel_number(kernel_of(name)), X, np.append(1.0 / scales, SHAPE.get(name, ())), out)
-    full = np.tril(out) + np.tril(out, -1).T
-    np.testing.assert_allclose(full, correlation_of(name, X, X, scales), atol=1e-15)
+    number, inverse = kernel_number(kernel_of(name)), np.append(1.0 / scales, SHAPE.get(name, ()))
+    starts = triangle(len(X))
+    out, factor = np.empty((2, starts[-1]))
+    correlations(number, X, transposed(X), inverse, starts, out, factor)
+    full, full_factor = np.empty((2, len(X), len(X)))
+    correlation_and_factor(number, X, X, inverse, full, full_factor)
+    lower = np.tril_indices(len(X))
+    np.testing.assert_allclose(out, full[lower], atol=1e-15)
+    np.testing.assert_allclose(factor, full_factor[lower], atol=1e-13)
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 31, 64])
+@pytest.mark.parametrize("name", REFERENCE)
+def test_rows_of_any_length_are_alike(name, count):
+    rng = np.random.default_rng(1)
+    P, Q, scales = rng.random((5, 3)), rng.random((count, 3)), np.array([0.3, 1.7, 0.05])
+    number, inverse = kernel_number(kernel_of(name)), np.append(1.0 / scales, SHAPE.get(name, ()))
+    out = np.empty(5 * count)
+    correlations(number, P, transposed(Q), inverse, rectangle(5, count), out, out[:0])
+    np.testing.assert_allclose(out.reshape(5, count), REFERENCE[name](scales)(P, Q), atol=1e-14)
 
 
 @pytest.mark.parametrize("name", REFERENCE)
@@ -122,8 +141,7 @@ def test_factor_gives_both_derivatives(name, points):
         step = h * np.eye(3)[k]
         numeric = (correlation_of(name, X, Q + step, scales) - correlation_of(name, X, Q - step, scales)) / (2 * h)
         t = Q[None, :, k] - X[:, None, k]
-        row = np.ascontiguousarray(Q[:, k])
-        g = np.array([along(number, X[i, k], row, inverse, k, factor[i], room[i]) for i in range(len(X))])
+        g = along(number, X, transposed(Q), inverse, k, rectangle(9, 5), factor.ravel(), room.ravel()).reshape(9, 5)
         np.testing.assert_allclose(-g * t / scales[k] ** 2, numeric, atol=1e-8)
         up, down = scales * np.exp(step), scales * np.exp(-step)
         numeric = (correlation_of(name, X, Q, up) - correlation_of(name, X, Q, down)) / (2 * h)
@@ -149,9 +167,9 @@ def test_derivatives_by_the_shape_of_two_scales(name, points):
     X, Q, scales = points
     proportion, share = SHAPE[name]
     squared = np.sum(((X[:, None] - Q) / scales) ** 2, axis=2)
-    by_proportion, by_share = np.vectorize(two_scale_slopes)(
-        squared, correlation_of(name, X, Q, scales), proportion, share
-    )
+    by_proportion, by_share = np.empty((2, len(X), len(Q)))
+    C = correlation_of(name, X, Q, scales)
+    two_scale_slopes(squared.ravel(), C.ravel(), proportion, share, by_proportion.ravel(), by_share.ravel())
     h, kernel = 1e-6, kernel_of(name)
     up, down = (correlation(kernel, X, Q, scales, proportion * np.exp(step), share) for step in (h, -h))
     np.testing.assert_allclose(by_proportion, (up - down) / (2 * h), atol=1e-8)

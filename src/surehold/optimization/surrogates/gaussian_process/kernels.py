@@ -50,13 +50,12 @@ __all__ = [
     "are_sums",
     "correlation_and_factor",
     "correlations",
-    "correlations_and_factors",
     "cross_correlation",
     "kernel_number",
-    "self_correlation",
-    "self_correlation_and_factor",
+    "rectangle",
     "shape_size",
     "transposed",
+    "triangle",
     "two_scale_slopes",
 ]
 
@@ -164,66 +163,6 @@ def _transform_with_factor(kernel, squared, factor, scales):
             factor[i] = e
 
 
-@njit(cache=True, fastmath={"contract"})
-def _squared_distances(x, Z, inverse_l, out):
-    """Fill `out` (q,) with || (x - z_j) / l ||^2 for x (d,) and the columns z_j of Z (d, q) that `out` has room for."""
-    d = x.size
-    out[:] = 0.0
-    for k in range(0, d - d % 2, 2):  # two dimensions at a time load and store the sums half as often
-        this, next_scale = inverse_l[k], inverse_l[k + 1]
-        for j in range(out.size):
-            t = (x[k] - Z[k, j]) * this
-            u = (x[k + 1] - Z[k + 1, j]) * next_scale
-            out[j] += t * t + u * u
-    for k in range(d - d % 2, d):
-        this = inverse_l[k]
-        for j in range(out.size):
-            t = (x[k] - Z[k, j]) * this
-            out[j] += t * t
-
-
-@njit(cache=True, fastmath={"contract"})
-def _products(x, Z, inverse_l, out):
-    """Fill `out` (q,) with the product form's correlation of x (d,) with columns of Z (d, q)."""
-    out[:] = 1.0
-    for k in range(x.size):
-        scale = _SQRT5 * inverse_l[k]
-        for j in range(out.size):
-            r = min(abs(x[k] - Z[k, j]) * scale, _FAR)
-            out[j] *= (1.0 + r + r * r / 3.0) * exponential(-r)
-
-
-@njit(cache=True, fastmath={"contract"})
-def _add_sums(x, Z, inverse_l, share, out):
-    """Add share times the sum of one-dimensional correlations of x (d,) with columns of Z (d, q) to `out` (q,)."""
-    for k in range(x.size):
-        scale = _SQRT5 * inverse_l[k]
-        for j in range(out.size):
-            r = min(abs(x[k] - Z[k, j]) * scale, _FAR)
-            out[j] += share * ((1.0 + r + r * r / 3.0) * exponential(-r))
-
-
-@njit(cache=True, fastmath={"contract"})
-def along(kernel, z, row, scales, k, factor, room):
-    """Return the factor (q,) of dimension k in the derivatives, see the module's legend.
-
-    z is coordinate k of a point, `row` (q,) that of others; factor (q,) is g, and is returned itself by kernels whose
-    dimensions share it; others fill `room` (q,).
-    """
-    share, scale = additive_share(kernel, scales), _SQRT5 * scales[k]
-    if share > 0.0:
-        for j in range(factor.size):
-            r = min(abs(z - row[j]) * scale, _FAR)
-            room[j] = factor[j] + share * (5.0 / 3.0 * (1.0 + r) * exponential(-r))
-    elif kernel == _PRODUCT:
-        for j in range(factor.size):
-            r = abs(z - row[j]) * scale
-            room[j] = factor[j] * (5.0 * (1.0 + r) / (3.0 + 3.0 * r + r * r))
-    else:
-        return factor
-    return room
-
-
 @njit(cache=True)
 def transposed(A):
     """Return A' (d, n) of A (n, d), C-contiguous; NumPy's own way takes seconds to compile."""
@@ -235,78 +174,150 @@ def transposed(A):
 
 
 @njit(cache=True)
-def correlations(kernel, x, Z, inverse_l, out):
-    """Fill `out` (q,) with c(x, z_j) of x (d,) and the columns z_j of Z (d, q) that `out` has room for."""
-    if kernel == _PRODUCT:
-        _products(x, Z, inverse_l, out)
-    else:
-        _squared_distances(x, Z, inverse_l, out)
-        _transform(kernel, out, inverse_l)
-        share = additive_share(kernel, inverse_l)
-        if share > 0.0:
-            _add_sums(x, Z, inverse_l, share, out)
+def rectangle(s, q):
+    """Return where each of s rows of q numbers starts in a flat array, and where the last one ends, (s + 1,)."""
+    return q * np.arange(s + 1)
 
 
 @njit(cache=True)
-def correlations_and_factors(kernel, x, Z, inverse_l, out, factor):
-    """Fill `out` (q,) as `correlations` does, and `factor` (q,) with the radial factor g of the module's legend."""
+def triangle(n):
+    """Return where each row of a lower triangle with its diagonal starts in a flat array, and its size, (n + 1,)."""
+    rows = np.arange(n + 1)
+    return rows * (rows + 1) // 2
+
+
+@njit(cache=True, fastmath={"contract"})
+def _squared_distances(P, Z, inverse_l, starts, out):
+    """Fill the rows of `out` with || (p_i - z_j) / l ||^2 of P (s, d) and the first columns of Z (d, q)."""
+    s, d = P.shape
+    even = d - d % 2
+    for i in range(s):
+        x, row = P[i], out[starts[i] : starts[i + 1]]
+        for k in range(0, even, 2):  # two dimensions at a time load and store the sums half as often
+            this, next_scale = inverse_l[k], inverse_l[k + 1]
+            if k == 0:
+                for j in range(row.size):
+                    t = (x[0] - Z[0, j]) * this
+                    u = (x[1] - Z[1, j]) * next_scale
+                    row[j] = t * t + u * u
+            else:
+                for j in range(row.size):
+                    t = (x[k] - Z[k, j]) * this
+                    u = (x[k + 1] - Z[k + 1, j]) * next_scale
+                    row[j] += t * t + u * u
+        if even == 0:
+            row[:] = 0.0
+        if even < d:
+            this = inverse_l[even]
+            for j in range(row.size):
+                t = (x[even] - Z[even, j]) * this
+                row[j] += t * t
+
+
+@njit(cache=True, fastmath={"contract"})
+def _distances_along(P, Z, k, scale, starts, out):
+    """Fill the rows of `out` with r = sqrt(5) |p_ik - z_jk| / l_k of P (s, d) and the first columns of Z (d, q)."""
+    for i in range(P.shape[0]):
+        z, row = P[i, k], out[starts[i] : starts[i + 1]]
+        for j in range(row.size):
+            row[j] = min(abs(z - Z[k, j]) * scale, _FAR)
+
+
+@njit(cache=True, fastmath={"contract"})
+def _multiply(r, out):
+    """Multiply `out` by the Matern-5/2 correlations at r, of the same size."""
+    for j in range(out.size):
+        out[j] *= (1.0 + r[j] + r[j] * r[j] / 3.0) * exponential(-r[j])
+
+
+@njit(cache=True, fastmath={"contract"})
+def _add(share, r, out):
+    """Add share times the Matern-5/2 correlations at r to `out`, of the same size."""
+    for j in range(out.size):
+        out[j] += share * ((1.0 + r[j] + r[j] * r[j] / 3.0) * exponential(-r[j]))
+
+
+@njit(cache=True, fastmath={"contract"})
+def along(kernel, P, Z, scales, k, starts, factor, room):
+    """Return the factors of dimension k in the derivatives, see the module's legend and `correlations`.
+
+    They are the radial factors g themselves of kernels whose dimensions share one; others fill `room`, of their size.
+    """
+    share = additive_share(kernel, scales)
+    if share > 0.0:
+        _distances_along(P, Z, k, _SQRT5 * scales[k], starts, room)
+        for j in range(room.size):
+            room[j] = factor[j] + share * (5.0 / 3.0 * (1.0 + room[j]) * exponential(-room[j]))
+    elif kernel == _PRODUCT:
+        _distances_along(P, Z, k, _SQRT5 * scales[k], starts, room)
+        for j in range(room.size):
+            room[j] = factor[j] * (5.0 * (1.0 + room[j]) / (3.0 + 3.0 * room[j] + room[j] * room[j]))
+    else:
+        return factor
+    return room
+
+
+@njit(cache=True)
+def correlations(kernel, P, Z, scales, starts, out, factor):
+    """Fill `out` with c(p_i, z_j) of P (s, d) and columns of Z (d, q), and `factor` with g of the module's legend.
+
+    Row i of the flat arrays, from starts[i] to starts[i + 1], is that of p_i and of as many first columns of Z: see
+    `rectangle` and `triangle`. A `factor` without room is not filled. All rows go through the exponential together:
+    SIMD code takes what is left over of each row one by one.
+    """
+    share = additive_share(kernel, scales)
     if kernel == _PRODUCT:
-        _products(x, Z, inverse_l, out)
+        out[:] = 1.0
+    else:
+        _squared_distances(P, Z, scales, starts, out)
+        if factor.size > 0:
+            _transform_with_factor(kernel, out, factor, scales)
+        else:
+            _transform(kernel, out, scales)
+    if kernel == _PRODUCT or share > 0.0:
+        r = np.empty(out.size)
+        for k in range(P.shape[1]):
+            _distances_along(P, Z, k, _SQRT5 * scales[k], starts, r)
+            if kernel == _PRODUCT:
+                _multiply(r, out)
+            else:
+                _add(share, r, out)
+    if kernel == _PRODUCT and factor.size > 0:
         for j in range(out.size):
             factor[j] = out[j]
-    else:
-        _squared_distances(x, Z, inverse_l, out)
-        _transform_with_factor(kernel, out, factor, inverse_l)
-        share = additive_share(kernel, inverse_l)
-        if share > 0.0:
-            _add_sums(x, Z, inverse_l, share, out)
-
-
-@njit(cache=True)
-def self_correlation(kernel, X, inverse_l, out):
-    """Fill the strict lower triangle of `out` (n, n) with c(x_i, x_j) of X (n, d) and its diagonal with 1."""
-    Z = transposed(X)
-    for i in range(X.shape[0]):
-        correlations(kernel, X[i], Z, inverse_l, out[i, :i])
-        out[i, i] = 1.0
-
-
-@njit(cache=True)
-def self_correlation_and_factor(kernel, X, inverse_l, out, factor):
-    """Fill the strict lower triangles of `out` and `factor` (n, n) with c(x_i, x_j) and g of X (n, d)."""
-    Z = transposed(X)
-    for i in range(X.shape[0]):
-        correlations_and_factors(kernel, X[i], Z, inverse_l, out[i, :i], factor[i, :i])
 
 
 @njit(cache=True)
 def cross_correlation(kernel, X, Q, inverse_l, out):
     """Fill `out` (n, q) with c(x_i, q_j) of X (n, d) and Q (q, d)."""
-    Z = transposed(Q)
-    for i in range(X.shape[0]):
-        correlations(kernel, X[i], Z, inverse_l, out[i])
+    flat = out.reshape(out.size)
+    correlations(kernel, X, transposed(Q), inverse_l, rectangle(*out.shape), flat, np.empty(0))
 
 
 @njit(cache=True)
 def correlation_and_factor(kernel, X, Q, inverse_l, out, factor):
     """Fill `out` (n, q) with c(x_i, q_j) and `factor` (n, q) with the radial factor g of the module's legend."""
-    Z = transposed(Q)
-    for i in range(X.shape[0]):
-        correlations_and_factors(kernel, X[i], Z, inverse_l, out[i], factor[i])
+    starts = rectangle(*out.shape)
+    correlations(kernel, X, transposed(Q), inverse_l, starts, out.reshape(out.size), factor.reshape(factor.size))
 
 
 @njit(cache=True)
-def two_scale_slopes(squared, c, a, w):
-    """Return the derivatives of a correlation c of two scales by log a and by log(w / (1 - w)), at rho^2 = squared."""
-    rho = _SQRT5 * sqrt(squared)
+def two_scale_slopes(squared, c, a, w, by_proportion, by_share):
+    """Fill the derivatives of correlations c of two scales by log a and by log(w / (1 - w)), at rho^2 = squared."""
     if a > _ADDITIVE:
-        s = min(a * _OF_ADDITIVE * rho, _FAR)
-        short = (1.0 + s + s * s / 3.0) * exponential(-s)
-        return -w * s * s / 3.0 * (1.0 + s) * exponential(-s), w * (short - c)
-    r, s = min(rho, _FAR), min(a * rho, _FAR)
-    short = (1.0 + s + s * s / 3.0) * exponential(-s)
-    long = (1.0 + r + r * r / 3.0) * exponential(-r)
-    return -w * s * s / 3.0 * (1.0 + s) * exponential(-s), w * (1.0 - w) * (short - long)
+        for i in range(c.size):
+            s = min(a * _OF_ADDITIVE * (_SQRT5 * sqrt(squared[i])), _FAR)
+            e = exponential(-s)
+            by_proportion[i] = -w * s * s / 3.0 * (1.0 + s) * e
+            by_share[i] = w * ((1.0 + s + s * s / 3.0) * e - c[i])
+    else:
+        for i in range(c.size):
+            rho = _SQRT5 * sqrt(squared[i])
+            r, s = min(rho, _FAR), min(a * rho, _FAR)
+            e = exponential(-s)
+            long = (1.0 + r + r * r / 3.0) * exponential(-r)
+            by_proportion[i] = -w * s * s / 3.0 * (1.0 + s) * e
+            by_share[i] = w * (1.0 - w) * ((1.0 + s + s * s / 3.0) * e - long)
 
 
 def correlation(kernel: str, X: np.ndarray, Q: np.ndarray, length_scales: np.ndarray, *shape: float) -> np.ndarray:

@@ -32,9 +32,9 @@ from surehold.optimization.numerics.triangular import gram_of_lower, invert_lowe
 from surehold.optimization.surrogates.gaussian_process.kernels import (
     TWO_SCALES,
     along,
-    self_correlation,
-    self_correlation_and_factor,
+    correlations,
     transposed,
+    triangle,
     two_scale_slopes,
 )
 from surehold.store.kernels import njit
@@ -135,10 +135,12 @@ def scales_of(theta, evidence):
 def data_covariance(X, noise, inverse_l, s2, v, ratio, mean_variance, kernel, A):
     """Fill the lower triangle of A (n, n) with s2 (C + ratio I) + m2 11' + diag(noise) + v I."""
     n = X.shape[0]
-    self_correlation(kernel, X, inverse_l, A)
+    starts = triangle(n)
+    C = np.empty(starts[n])
+    correlations(kernel, X, transposed(X), inverse_l, starts, C, C[:0])
     for i in range(n):
         for j in range(i):
-            A[i, j] = A[i, j] * s2 + mean_variance
+            A[i, j] = C[starts[i] + j] * s2 + mean_variance
         A[i, i] = s2 * (1.0 + ratio) + mean_variance + noise[i] + v
 
 
@@ -200,16 +202,38 @@ def _add_weighted_squares(z, row, scale, weights, gradient, k):
 
 
 @njit(cache=True)
+def _add_slopes_by_shape(X, Z, scales, starts, weights, C, room, gradient):
+    """Add the derivatives by the shape of two scales to `gradient` (d + 4,), for pairs of `weights` and correlations C.
+
+    These are flat triangles, as `room` is, which is overwritten.
+    """
+    n, d = X.shape
+    room[:] = 0.0
+    for i in range(n):
+        for k in range(d):
+            for j in range(i):
+                t = (X[i, k] - Z[k, j]) * scales[k]
+                room[starts[i] + j] += t * t
+    by_proportion, by_share = np.empty(C.size), np.empty(C.size)
+    two_scale_slopes(room, C, scales[d], scales[d + 1], by_proportion, by_share)
+    for i in range(n):
+        for pair in range(starts[i], starts[i] + i):
+            gradient[d + 2] += weights[pair] * by_proportion[pair]
+            gradient[d + 3] += weights[pair] * by_share[pair]
+
+
+@njit(cache=True)
 def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel, gradient):
     """Return log p of one block and add its derivatives to `gradient` (d + 4,): log l, log s2, log v, shape."""
     n, d = X.shape
-    C = np.empty((n, n))
-    factor = np.empty((n, n))
-    self_correlation_and_factor(kernel, X, inverse_l, C, factor)
+    Z = transposed(X)
+    starts = triangle(n)
+    C, factor, room = np.empty(starts[n]), np.empty(starts[n]), np.empty(starts[n])
+    correlations(kernel, X, Z, inverse_l, starts, C, factor)
     L = np.empty((n, n))
     for i in range(n):
         for j in range(i):
-            L[i, j] = s2 * C[i, j] + mean_variance
+            L[i, j] = s2 * C[starts[i] + j] + mean_variance
         L[i, i] = s2 * (1.0 + ratio) + mean_variance + noise[i] + v
     if not cholesky(L):
         return -inf
@@ -225,30 +249,25 @@ def _block_gradient(X, y, noise, inverse_l, s2, v, ratio, mean_variance, kernel,
     solve_lower_transposed(L, alpha)
     A_inverse = L  # not needed any more
     gram_of_lower(inverse, A_inverse)
-    Z = transposed(X)
-    weights, weighted, room = np.empty(n), np.empty(n), np.empty(n)
+    weights, weighted = np.empty(starts[n]), np.empty(n)
     for i in range(n):  # 1/2 tr((alpha alpha' - A^-1) dA/dtheta), GPML (5.9)
         by_signal = 0.0
         for j in range(i):
             w = (alpha[i] * alpha[j] - A_inverse[i, j]) * s2  # the two symmetric entries together
-            by_signal += w * C[i, j]
-            weights[j] = w
-            if kernel == TWO_SCALES:
-                squared = 0.0
-                for k in range(d):
-                    t = (X[i, k] - X[j, k]) * inverse_l[k]
-                    squared += t * t
-                by_proportion, by_share = two_scale_slopes(squared, C[i, j], inverse_l[d], inverse_l[d + 1])
-                gradient[d + 2] += w * by_proportion
-                gradient[d + 3] += w * by_share
-        for k in range(d):
-            g = along(kernel, X[i, k], Z[k, :i], inverse_l, k, factor[i, :i], room[:i])
-            for j in range(i):
-                weighted[j] = weights[j] * g[j]
-            _add_weighted_squares(X[i, k], Z[k, :i], inverse_l[k], weighted[:i], gradient, k)
+            c = C[starts[i] + j]
+            by_signal += w * c
+            weights[starts[i] + j] = w
         w = 0.5 * (alpha[i] * alpha[i] - A_inverse[i, i])
         gradient[d] += by_signal + w * s2 * (1.0 + ratio)
         gradient[d + 1] += w * v
+    if kernel == TWO_SCALES:
+        _add_slopes_by_shape(X, Z, inverse_l, starts, weights, C, room, gradient)
+    for k in range(d):
+        g = along(kernel, X, Z, inverse_l, k, starts, factor, room)
+        for i in range(n):
+            for j in range(i):
+                weighted[j] = weights[starts[i] + j] * g[starts[i] + j]
+            _add_weighted_squares(X[i, k], Z[k, :i], inverse_l[k], weighted[:i], gradient, k)
     return value
 
 

@@ -19,8 +19,9 @@ from surehold.optimization.numerics.triangular import times_lower, times_lower_t
 from surehold.optimization.surrogates.gaussian_process.kernels import (
     along,
     correlations,
-    correlations_and_factors,
+    rectangle,
     transposed,
+    triangle,
 )
 from surehold.optimization.surrogates.gaussian_process.neighborhoods import gathered
 from surehold.optimization.surrogates.gaussian_process.prediction import add, average, factorize, slopes_along
@@ -183,8 +184,10 @@ def average_by_groups(
             return mean, variance, mean_gradient, variance_gradient
         U, _, heard = gathered(trials[:size], X, Y[:0], noise)
         Z = transposed(U)
-        C = np.empty(size)
-        F = np.empty((s if gradient else 0, size))
+        starts, triangular = rectangle(s, size), triangle(size)
+        C, pairs = np.empty(s * size), np.empty(triangular[size])
+        F = np.empty(s * size if gradient else 0)
+        rows_of_points = C.reshape((s, size))
         K = np.empty((g, 1, width))
         c_all, W, AW = np.empty(size), np.empty(size), np.empty(size)
         first = np.empty((g, size))
@@ -192,15 +195,12 @@ def average_by_groups(
         for j in range(m):
             K[:] = 0.0
             c_all[:] = shift
+            correlations(kernel, points, Z, inverse_l[j], starts, C, F)
+            add(rows_of_points, s2[j] * weights, c_all)
             for w in range(s):
-                if gradient:
-                    correlations_and_factors(kernel, points[w], Z, inverse_l[j], C, F[w])
-                else:
-                    correlations(kernel, points[w], Z, inverse_l[j], C)
-                add(C, s2[j] * weights[w], c_all)
                 h = groups[i, w]
                 for a in range(sizes[h]):
-                    K[h, 0, a] += weights[w] * (s2[j] * C[index[h, a]] + mean_variance)
+                    K[h, 0, a] += weights[w] * (s2[j] * rows_of_points[w, index[h, a]] + mean_variance)
             W[:] = 0.0
             total = 0.0
             for h in range(g):
@@ -220,9 +220,9 @@ def average_by_groups(
             mean[j, i] = total
             for a in range(size):
                 AW[a] = (s2[j] * (1.0 + ratio) + mean_variance + heard[a] + v[j]) * W[a]
+            correlations(kernel, U, Z, inverse_l[j], triangular, pairs, pairs[:0])
             for a in range(size):
-                correlations(kernel, U[a], Z, inverse_l[j], C[:a])
-                _symmetric(C, a, s2[j], mean_variance, W, AW)
+                _symmetric(pairs[triangular[a] :], a, s2[j], mean_variance, W, AW)
             variance[j, i] = prior[0][j, b] - 2.0 * product(W, c_all, size) + product(W, AW, size)
             if gradient:
                 for h in range(g):
@@ -238,11 +238,11 @@ def average_by_groups(
                         second[h, index[h, a]] += out[0, a]
                 for k in range(d):
                     variance_gradient[j, i, k] = prior[1][j, b, k]
-                for w in range(s):
-                    h = groups[i, w]
-                    for k in range(d):
-                        factor = along(kernel, points[w, k], Z[k], inverse_l[j], k, F[w], C)
-                        t, u = slopes_along(factor, points[w, k], Z[k], first[h], second[h])
+                for k in range(d):
+                    factors = along(kernel, points, Z, inverse_l[j], k, starts, F, C).reshape((s, size))
+                    for w in range(s):
+                        h = groups[i, w]
+                        t, u = slopes_along(factors[w], points[w, k], Z[k], first[h], second[h])
                         rate = s2[j] * inverse_l[j, k] ** 2 * weights[w] * slopes[b, w, k]
                         mean_gradient[j, i, k] += rate * t
                         variance_gradient[j, i, k] -= 2.0 * rate * u

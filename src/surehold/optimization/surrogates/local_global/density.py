@@ -10,7 +10,12 @@ import numpy as np
 
 from surehold.optimization.numerics.cholesky import cholesky
 from surehold.optimization.numerics.triangular import solve_lower
-from surehold.optimization.surrogates.gaussian_process.kernels import correlation_and_factor, self_correlation
+from surehold.optimization.surrogates.gaussian_process.kernels import (
+    correlation_and_factor,
+    correlations,
+    transposed,
+    triangle,
+)
 from surehold.store.kernels import njit
 
 __all__ = ["MATERN52", "NARROW", "WIDE", "fill_prior", "fill_shares", "log_posterior"]
@@ -84,14 +89,18 @@ def log_posterior(theta, evidence):
             value -= 0.5 * ((theta[i] - evidence.prior_mean[i]) / evidence.prior_deviation[i]) ** 2
     c = theta[2 * d + 1 :]
     s2 = exp(theta[2 * d])
-    A, local = np.empty((n, n)), np.empty((n, n))
-    self_correlation(evidence.kernel, evidence.X, np.exp(-theta[:d]), A)
-    self_correlation(evidence.kernel, evidence.X, np.exp(-theta[d : 2 * d]), local)
+    Z = transposed(evidence.X)
+    starts = triangle(n)
+    wide, local = np.empty(starts[n]), np.empty(starts[n])
+    correlations(evidence.kernel, evidence.X, Z, np.exp(-theta[:d]), starts, wide, wide[:0])
+    correlations(evidence.kernel, evidence.X, Z, np.exp(-theta[d : 2 * d]), starts, local, local[:0])
+    A = np.empty((n, n))
     shares = np.empty((2, n))
     fill_shares(evidence.X, c, shares)
     for i in range(n):
         for j in range(i):
-            A[i, j] = s2 * (shares[0, i] * shares[0, j] * A[i, j] + shares[1, i] * shares[1, j] * local[i, j])
+            pair = starts[i] + j
+            A[i, j] = s2 * (shares[0, i] * shares[0, j] * wide[pair] + shares[1, i] * shares[1, j] * local[pair])
         A[i, i] = s2 * (1.0 + evidence.ratio) + evidence.noise[i]
     if not cholesky(A):
         return -inf
