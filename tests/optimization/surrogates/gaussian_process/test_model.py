@@ -99,6 +99,19 @@ def test_offsets_of_each_query(data, learnt):
             np.testing.assert_allclose(one[:, 0], all_[:, i], atol=1e-9)
 
 
+@pytest.mark.parametrize(("count", "queries"), [(1, 450), (64, 10), (300, 2)])
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_many_queries_at_once_are_answered_as_each_alone(kernel, count, queries, data):
+    X, y, _ = data
+    posterior = GaussianProcess(kernel=kernel, length_scales=[0.3, 0.6], mean_variance=0.5, ratio=1e-6).fit(X, y)
+    rng = np.random.default_rng(4)
+    Q, offsets, weights = rng.random((queries, 2)), 0.1 * rng.standard_normal((queries, count, 2)), rng.random(count)
+    together = posterior.posterior.average(Q, offsets, weights, gradient=True)
+    alone = [posterior.posterior.average(Q[i : i + 1], offsets[i], weights, gradient=True) for i in range(queries)]
+    for found, each in zip(together, zip(*alone, strict=True), strict=True):
+        np.testing.assert_allclose(found, np.concatenate(each, axis=1), rtol=1e-9, atol=1e-9)
+
+
 def test_what_is_remembered_of_perturbations_is_of_these_alone(data, learnt):
     Q, weights = data[2], np.array([0.5, 0.3, 0.2])
     near, far = (scale * np.random.default_rng(3).standard_normal((3, 2)) for scale in (0.1, 0.2))
@@ -186,7 +199,7 @@ def test_draws_of_many_queries_at_once_are_those_of_each_alone(learnt, clipped):
 @pytest.mark.parametrize("kernel", ["matern52", "squared_exponential", "matern52_two_scales"])
 def test_means_alone_are_those_of_the_moments(kernel, data):
     X, y, _ = data
-    queries = np.random.default_rng(1).uniform(-0.2, 1.2, (40, 2))
+    queries = np.random.default_rng(1).uniform(-0.2, 1.2, (450, 2))
     posterior = GaussianProcess(kernel=kernel, mean_variance=0.3).condition(X, 9.0 * y, np.random.default_rng(0))
     np.testing.assert_allclose(posterior.means(queries), posterior.moments(queries).mean, rtol=1e-9)
     tree = TreedGaussianProcess().condition(X, y, np.random.default_rng(0))

@@ -40,6 +40,7 @@ __all__ = ["add", "average", "factorize", "means", "prior_variance", "sample", "
 
 _LARGEST_REPAIR = 1e-2  # nugget ratio beyond which a factorization is given up
 _ALIKE = 1e-12  # box widths between perturbations that differ by rounding only
+_TOGETHER = 4096  # correlations, about, that go through the exponential together: a core's nearest memory holds them
 _REPAIRS = 12  # nuggets that are tried for a draw, each ten times the one before: NaN is never factorized
 
 
@@ -136,6 +137,12 @@ def prior_variance(offsets, slopes, weights, inverse_l, s2, mean_variance, kerne
 
 
 @njit(cache=True)
+def _queries_together(q, size):
+    """Return how many of q queries, each of `size` correlations, go through the exponential together: one or more."""
+    return max(1, min(q, _TOGETHER // max(1, size)))
+
+
+@njit(cache=True)
 def average(Q, offsets, slopes, weights, prior, X, inverse_l, s2, mean_variance, kernel, inverse_L, alpha, gradient):
     """Return mean, variance (m, q) and their gradients (m, q, d) of the weighted sums at Q (q, d).
 
@@ -146,20 +153,21 @@ def average(Q, offsets, slopes, weights, prior, X, inverse_l, s2, mean_variance,
     q, d = Q.shape
     s = weights.size
     last = offsets.shape[0] - 1
-    points = np.empty((q, s, d))
+    points = np.empty((q * s, d))
     for i in range(q):
         for w in range(s):
             for k in range(d):
-                points[i, w, k] = Q[i, k] + offsets[min(i, last), w, k]
+                points[i * s + w, k] = Q[i, k] + offsets[min(i, last), w, k]
     Z = transposed(X)
     mean = np.empty((m, q))
     variance = np.empty((m, q))
     mean_gradient = np.zeros((m, q if gradient else 0, d))
     variance_gradient = np.zeros((m, q if gradient else 0, d))
-    starts = rectangle(s, n)
-    C = np.empty(s * n)
-    rows = C.reshape((s, n))
-    F = np.empty((q if gradient else 1, s * n if gradient else 0))
+    size = s * n
+    together = _queries_together(q, size)
+    starts = rectangle(together * s, n)
+    C = np.empty(together * size)
+    F = np.empty(q * size if gradient else 0)
     K, V = np.empty((q, n)), np.empty((q, n))
     W = np.empty((q if gradient else 0, n))
     shift = mean_variance * weights.sum()
@@ -170,23 +178,31 @@ def average(Q, offsets, slopes, weights, prior, X, inverse_l, s2, mean_variance,
                 for k in range(d):
                     variance_gradient[j, i, k] = prior[1][j, min(i, last), k]
         K[:] = shift
-        for i in range(q):
-            correlations(kernel, points[i], Z, inverse_l[j], starts, C, F[i if gradient else 0])
-            add(rows, s2[j] * weights, K[i])
+        factors = s2[j] * weights
+        for first in range(0, q, together):
+            end = min(first + together, q)
+            P, part, radial = points[first * s : end * s], C[: (end - first) * size], F[first * size : end * size]
+            correlations(kernel, P, Z, inverse_l[j], starts, part, radial)
+            rows = part.reshape((end - first, s, n))
+            for i in range(first, end):
+                add(rows[i - first], factors, K[i])
         times_lower(inverse_L[j], K, V)
         for i in range(q):
             mean[j, i] = product(alpha[j], K[i], n)
             variance[j, i] -= product(V[i], V[i], n)
         if gradient:
             times_lower_transposed(inverse_L[j], V, W)
-            for i in range(q):
+            for first in range(0, q, together):
+                end = min(first + together, q)
+                P, part, radial = points[first * s : end * s], C[: (end - first) * size], F[first * size : end * size]
                 for k in range(d):
-                    g = along(kernel, points[i], Z, inverse_l[j], k, starts, F[i], C).reshape((s, n))
-                    for w in range(s):
-                        t, u = slopes_along(g[w], points[i, w, k], Z[k], alpha[j], W[i])
-                        rate = s2[j] * inverse_l[j, k] ** 2 * weights[w] * slopes[min(i, last), w, k]
-                        mean_gradient[j, i, k] += rate * t
-                        variance_gradient[j, i, k] -= 2.0 * rate * u
+                    g = along(kernel, P, Z, inverse_l[j], k, starts, radial, part).reshape((end - first, s, n))
+                    for i in range(first, end):
+                        for w in range(s):
+                            t, u = slopes_along(g[i - first, w], points[i * s + w, k], Z[k], alpha[j], W[i])
+                            rate = s2[j] * inverse_l[j, k] ** 2 * weights[w] * slopes[min(i, last), w, k]
+                            mean_gradient[j, i, k] += rate * t
+                            variance_gradient[j, i, k] -= 2.0 * rate * u
     return mean, np.maximum(variance, 0.0), mean_gradient, variance_gradient
 
 
@@ -195,14 +211,20 @@ def means(Q, X, inverse_l, s2, mean_variance, kernel, alpha):
     """Return the means (m, q) at Q (q, d): a variance takes n times as long."""
     m, n = alpha.shape
     Z = transposed(X)
-    result = np.empty((m, len(Q)))
-    starts = rectangle(1, n)
-    C = np.empty(n)
+    q = len(Q)
+    result = np.empty((m, q))
+    together = _queries_together(q, n)
+    starts = rectangle(together, n)
+    C = np.empty(together * n)
     for j in range(m):
         level = mean_variance * alpha[j].sum()
-        for i in range(len(Q)):
-            correlations(kernel, Q[i : i + 1], Z, inverse_l[j], starts, C, C[:0])
-            result[j, i] = level + s2[j] * product(alpha[j], C, n)
+        for first in range(0, q, together):
+            end = min(first + together, q)
+            part = C[: (end - first) * n]
+            correlations(kernel, Q[first:end], Z, inverse_l[j], starts, part, part[:0])
+            rows = part.reshape((end - first, n))
+            for i in range(first, end):
+                result[j, i] = level + s2[j] * product(alpha[j], rows[i - first], n)
     return result
 
 
