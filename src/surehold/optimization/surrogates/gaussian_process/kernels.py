@@ -193,20 +193,13 @@ def _squared_distances(P, Z, inverse_l, starts, out):
     even = d - d % 2
     for i in range(s):
         x, row = P[i], out[starts[i] : starts[i + 1]]
+        row[:] = 0.0
         for k in range(0, even, 2):  # two dimensions at a time load and store the sums half as often
             this, next_scale = inverse_l[k], inverse_l[k + 1]
-            if k == 0:
-                for j in range(row.size):
-                    t = (x[0] - Z[0, j]) * this
-                    u = (x[1] - Z[1, j]) * next_scale
-                    row[j] = t * t + u * u
-            else:
-                for j in range(row.size):
-                    t = (x[k] - Z[k, j]) * this
-                    u = (x[k + 1] - Z[k + 1, j]) * next_scale
-                    row[j] += t * t + u * u
-        if even == 0:
-            row[:] = 0.0
+            for j in range(row.size):
+                t = (x[k] - Z[k, j]) * this
+                u = (x[k + 1] - Z[k + 1, j]) * next_scale
+                row[j] += t * t + u * u
         if even < d:
             this = inverse_l[even]
             for j in range(row.size):
@@ -291,7 +284,7 @@ def correlations(kernel, P, Z, scales, starts, out, factor):
 def cross_correlation(kernel, X, Q, inverse_l, out):
     """Fill `out` (n, q) with c(x_i, q_j) of X (n, d) and Q (q, d)."""
     flat = out.reshape(out.size)
-    correlations(kernel, X, transposed(Q), inverse_l, rectangle(*out.shape), flat, np.empty(0))
+    correlations(kernel, X, transposed(Q), inverse_l, rectangle(*out.shape), flat, flat[:0])
 
 
 @njit(cache=True)
