@@ -4,8 +4,8 @@ Nothing but a regular file is read: no device, no pipe, no archive. Material fil
 neither looked for nor fetched; of a glTF, a buffer in the same folder or below is read, and no other.
 
 Read although it is not quite what the format says: text in UTF-16, decimal commas, a binary STL followed by other bytes
-or whose header counts no triangles. A note says so. OBJ and PLY have readers of their own (obj_files.py, ply_files.py),
-STL and glTF are read by trimesh.
+or whose header counts no triangles. A note says so. STL, OBJ and PLY have readers of their own (stl_files.py and so
+on), glTF is read by trimesh.
 """
 
 import base64
@@ -26,6 +26,7 @@ from surehold.errors import InputError
 from surehold.grasping.object.obj_files import read_obj
 from surehold.grasping.object.ply_files import read_ply
 from surehold.grasping.object.polygons import triangles_of
+from surehold.grasping.object.stl_files import binary_stl, read_binary_stl, read_text_stl
 
 __all__ = ["MESH_FORMATS", "read_mesh"]
 
@@ -48,14 +49,15 @@ def read_mesh(file: Path, kind: str) -> tuple[NDArray[np.float64], NDArray[np.in
         raise InputError(f"{file.name!r} is an archive; unpack it and give the mesh inside.")
     if content.startswith(b"version https://git-lfs"):
         raise InputError(f"{file.name!r} is a pointer of Git LFS, not the mesh; run git lfs pull and give it again.")
-    if kind == "stl" and not (content[:5].lower() == b"solid" and b"facet" in content[:2000]):
-        content = _binary_stl(content, notes)
     if kind in ("gltf", "glb"):
         content = _self_contained(file, content, kind)
-    elif not _is_binary(content, kind):
-        content = _plain_text(content, notes)
     try:
-        if kind == "obj":
+        facets = binary_stl(content, notes) if kind == "stl" else None
+        if kind == "obj" or (kind == "stl" and facets is None) or (kind == "ply" and not _is_binary(content)):
+            content = _plain_text(content, notes)
+        if kind == "stl":
+            vertices, faces = read_text_stl(content, notes) if facets is None else read_binary_stl(facets)
+        elif kind == "obj":
             vertices, faces = read_obj(content)
         elif kind == "ply":
             ply = read_ply(content)
@@ -77,7 +79,7 @@ def read_mesh(file: Path, kind: str) -> tuple[NDArray[np.float64], NDArray[np.in
 
 
 def _by_trimesh(content: bytes, kind: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return vertices and triangles of STL or glTF, none where there are none."""
+    """Return vertices and triangles of glTF, none where there are none."""
     import trimesh
 
     with warnings.catch_warnings():
@@ -114,24 +116,8 @@ def _bytes(file: Path) -> bytes:
         raise InputError(f"cannot read {str(file)!r}: {getattr(error, 'strerror', None) or error}.") from None
 
 
-def _binary_stl(content: bytes, notes: list[str]) -> bytes:
-    """Return a binary STL whose header counts the triangles that follow, and nothing behind them."""
-    if len(content) < 134:
-        return content
-    count, behind = struct.unpack("<I", content[80:84])[0], len(content) - 84
-    if count == 0 and behind % 50 == 0:
-        notes.append(f"its header counts no triangles, {behind // 50:,} follow and are read")
-        return content[:80] + struct.pack("<I", behind // 50) + content[84:]
-    if 0 < 50 * count < behind:
-        notes.append(f"{behind - 50 * count:,} bytes behind the last triangle are ignored")
-        return content[: 84 + 50 * count]
-    return content
-
-
-def _is_binary(content: bytes, kind: str) -> bool:
-    if kind == "stl":
-        return len(content) >= 84 and len(content) == 84 + 50 * struct.unpack("<I", content[80:84])[0]
-    return kind == "ply" and b"format binary" in content[:200]
+def _is_binary(content: bytes) -> bool:
+    return b"format binary" in content[:200]
 
 
 def _plain_text(content: bytes, notes: list[str]) -> bytes:
