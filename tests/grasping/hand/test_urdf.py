@@ -125,6 +125,28 @@ def test_a_joint_that_mimics_none_is_refused(tmp_path, leader):
         load_hand(path, CONFIG)
 
 
+@pytest.mark.parametrize(("limits", "expected"), [('upper="1.2"', (0.0, 1.2)), ('lower="-1.2"', (-1.2, 0.0))])
+def test_a_limit_that_is_left_out_is_zero(tmp_path, limits, expected):
+    """As URDF has it; MuJoCo takes the joint as one without limits, and it opened and closed beyond its end."""
+    text = urdf('<box size=".02 .016 .06"/>').replace('lower="0" upper="1.5"', limits, 1)
+    assert propose_hand(written(tmp_path, "meshes/box.stl", text)).ranges["a1"] == expected
+
+
+@pytest.mark.parametrize("limits", ['lower="1.5" upper="0"', 'lower="0" upper="nan"', 'lower="0" upper="90 deg"'])
+def test_limits_that_are_none_are_refused(tmp_path, limits):
+    """MuJoCo takes a joint whose limits are exchanged as one without limits."""
+    text = urdf('<box size=".02 .016 .06"/>').replace('lower="0" upper="1.5"', limits, 1)
+    with pytest.raises(InputError, match=r"joint 'a1' has the limits .* the lower one first"):
+        load_hand(written(tmp_path, "meshes/box.stl", text), CONFIG)
+
+
+def test_two_joints_of_one_name_are_refused(tmp_path):
+    """MuJoCo leaves the second without a name."""
+    text = urdf('<box size=".02 .016 .06"/>').replace('"c1"', '"a1"')
+    with pytest.raises(InputError, match="has 2 joints 'a1'; give each a name of its own"):
+        load_hand(written(tmp_path, "meshes/box.stl", text), CONFIG)
+
+
 def test_limits_in_degrees_are_refused(tmp_path):
     path = written(tmp_path, "meshes/box.stl", urdf('<box size=".02 .016 .06"/>').replace('"1.5"', '"85.9"'))
     with pytest.raises(

@@ -24,7 +24,8 @@ def read_urdf(path: Path) -> tuple[str, dict[str, bytes]]:
     Raises
     ------
     InputError
-        If the file cannot be read, is no XML, a joint mimics one that is not there, or a mesh is not found or is none.
+        If the file cannot be read, is no XML, two joints have one name, the limits of a joint are exchanged, a joint
+        mimics one that is not there, or a mesh is not found or is none.
     """
     content = regular_bytes(path)
     if b"<!ENTITY" in content:  # which can grow without bound
@@ -35,7 +36,9 @@ def read_urdf(path: Path) -> tuple[str, dict[str, bytes]]:
         raise InputError(f"{str(path)!r} is not a model that MuJoCo can read: {error}.") from None
     if any("xacro" in element.tag for element in robot.iter()):
         raise InputError(f"{str(path)!r} is a xacro file; make a URDF of it: xacro {path.name} > plain.urdf.")
-    _check_mimics(robot, path)
+    _check_joints(robot, path)
+    for joint in robot.iterfind("joint"):
+        _complete_limits(joint, path)
     folder = path.resolve().parent
     for compiler in robot.iterfind("mujoco/compiler"):
         folder = folder / compiler.attrib.pop("meshdir", "")
@@ -53,9 +56,12 @@ def read_urdf(path: Path) -> tuple[str, dict[str, bytes]]:
     return ElementTree.tostring(robot, encoding="unicode"), assets
 
 
-def _check_mimics(robot: ElementTree.Element, path: Path) -> None:
-    """Refuse a joint that follows none: MuJoCo would leave it where it is."""
+def _check_joints(robot: ElementTree.Element, path: Path) -> None:
+    """Refuse a joint that follows none, which MuJoCo would leave where it is, and a name that two joints have."""
     names = [joint.get("name", "") for joint in robot.iterfind("joint")]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{str(path)!r} has {names.count(name)} joints {name!r}; give each a name of its own.")
     for joint in robot.iterfind("joint"):
         for mimic in joint.iterfind("mimic"):
             leader = mimic.get("joint", "")
@@ -65,6 +71,26 @@ def _check_mimics(robot: ElementTree.Element, path: Path) -> None:
                     f"{str(path)!r}: joint {joint.get('name')!r} mimics {leader!r}: "
                     f"{unknown_name('joint', leader, others)}"
                 )
+
+
+def _complete_limits(joint: ElementTree.Element, path: Path) -> None:
+    """Write the end that a limit leaves out, which is 0 in URDF: MuJoCo takes such a joint as one without limits.
+
+    Exchanged ends it takes so, too; they are refused.
+    """
+    for limit in joint.iterfind("limit"):
+        if "lower" not in limit.attrib and "upper" not in limit.attrib:
+            continue
+        lower, upper = limit.attrib.setdefault("lower", "0"), limit.attrib.setdefault("upper", "0")
+        try:
+            valid = float(lower) <= float(upper)
+        except ValueError:
+            valid = False
+        if not valid:
+            raise InputError(
+                f"{str(path)!r}: joint {joint.get('name')!r} has the limits {lower[:20]!r} to {upper[:20]!r}; give two "
+                "numbers, the lower one first [rad or m]."
+            )
 
 
 def _found(name: str, urdf: Path, folder: Path) -> Path:
