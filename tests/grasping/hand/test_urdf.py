@@ -140,6 +140,15 @@ def test_limits_that_are_none_are_refused(tmp_path, limits):
         load_hand(written(tmp_path, "meshes/box.stl", text), CONFIG)
 
 
+def test_limits_of_a_continuous_joint_do_not_matter(tmp_path):
+    text = (
+        urdf('<box size=".02 .016 .06"/>')
+        .replace('"revolute"', '"continuous"', 1)
+        .replace('upper="1.5"', 'upper="-1"', 1)
+    )
+    assert propose_hand(written(tmp_path, "meshes/box.stl", text)).ranges["a1"] == (-np.pi, np.pi)
+
+
 def test_two_joints_of_one_name_are_refused(tmp_path):
     """MuJoCo leaves the second without a name."""
     text = urdf('<box size=".02 .016 .06"/>').replace('"c1"', '"a1"')

@@ -79,7 +79,7 @@ def _complete_limits(joint: ElementTree.Element, path: Path) -> None:
     Exchanged ends it takes so, too; they are refused.
     """
     for limit in joint.iterfind("limit"):
-        if "lower" not in limit.attrib and "upper" not in limit.attrib:
+        if joint.get("type") not in ("revolute", "prismatic") or not {"lower", "upper"} & set(limit.attrib):
             continue
         lower, upper = limit.attrib.setdefault("lower", "0"), limit.attrib.setdefault("upper", "0")
         try:
