@@ -121,12 +121,26 @@ def test_columns_may_be_apart_by_commas(tmp_path, rows, encoding):
     assert read_cloud(tmp_path / "a.xyz").points.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
 
 
-def test_colors_are_no_normals(tmp_path):
-    colors = np.random.default_rng(1).integers(0, 256, (7, 3))
+@pytest.mark.parametrize(
+    "colors",
+    [
+        np.random.default_rng(1).integers(0, 256, (7, 3)),
+        np.random.default_rng(1).random((7, 3)),
+        np.random.default_rng(1).random((7, 3)) * 255.0,
+    ],
+)
+def test_colors_are_no_normals(tmp_path, colors):
     np.savetxt(tmp_path / "a.xyz", np.hstack([POINTS, colors]), fmt="%.9g")
     cloud = read_cloud(tmp_path / "a.xyz")
     assert cloud.normals is None
     assert cloud.points == pytest.approx(POINTS)
+
+
+def test_normals_that_all_point_up_are_no_colors(tmp_path):
+    normals = np.random.default_rng(1).random((7, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    np.savetxt(tmp_path / "a.xyz", np.hstack([POINTS, normals]), fmt="%.2f")
+    assert read_cloud(tmp_path / "a.xyz").normals == pytest.approx(normals, abs=0.01)
 
 
 def test_a_header_may_leave_out_what_follows_from_the_rest(tmp_path):

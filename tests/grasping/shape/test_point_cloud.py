@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import trimesh
 
 from surehold.errors import InputError
 from surehold.grasping.object.distance_field import distance_field_of
@@ -57,6 +58,25 @@ def test_many_points_are_thinned_and_gain_precision():
     cloud = cleaned(dense, camera=CAMERA)
     assert len(cloud.points) <= 2500
     assert np.median(cloud.noise) < 0.001
+
+
+@pytest.mark.parametrize("seen", [-1.0, 0.0])  # all of a ball, and half of it
+def test_normals_that_point_inwards_are_refused(seen):
+    """A ball of 60 mm was learnt as one of 86 mm from them."""
+    outward = np.random.default_rng(4).normal(size=(600, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    outward = outward[outward[:, 0] > seen]
+    assert np.sum(cleaned(0.03 * outward, outward).normals * outward, axis=1).min() > 0.9
+    with pytest.raises(InputError, match="100 % of the normals point to the middle of the cloud; turn them"):
+        cleaned(0.03 * outward, -outward)
+
+
+@pytest.mark.parametrize("name", ["mug", "glass"])
+def test_normals_of_thin_walls_are_taken(name):
+    body = trimesh.Trimesh(shipped_object(name).vertices, shipped_object(name).faces, process=False)
+    points, faces = trimesh.sample.sample_surface(body, 2000, seed=0)
+    outward = body.face_normals[faces]
+    np.testing.assert_allclose(cleaned(points, outward, most=5000).normals, outward, atol=1e-12)
 
 
 def test_normals_of_a_file_are_turned_to_the_camera(mug):

@@ -3,8 +3,8 @@
 PLY   vertices x y z and, where they are there, nx ny nz (object/ply_files.py); faces are not looked at
 PCD   ascii, binary or compressed, fields x y z and normal_x normal_y normal_z; the header's VIEWPOINT is the camera,
       unless it is the origin, which most writers leave there
-XYZ   text, three or six columns: x y z and nx ny nz, or a color of whole numbers to 255; # starts a comment; numbers
-      with decimal commas are apart by spaces or semicolons
+XYZ   text, three or six columns: x y z and nx ny nz, or a color: numbers from 0 to 255 that are no unit vectors; #
+      starts a comment; numbers with decimal commas are apart by spaces or semicolons
 NPZ   arrays "points" (n, 3), and optionally "normals" (n, 3) and "camera" (3,)
 """
 
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 CLOUD_FORMATS: Final = ("ply", "pcd", "xyz", "npz")
 _MOST_BYTES: Final = 2**30
 _COMMENTS: Final = ("#", "//")
+_ROUNDED: Final = 0.02  # of the length of a normal in text
 _DECIMAL_COMMA: Final = r"[-+]?(\d+|\d+,\d+)([eE][-+]?\d+)?"
 _LETTERS: Final = {"F": "f", "I": "i", "U": "u"}
 _KINDS: Final = ("f4", "f8", *(f"{letter}{size}" for letter in "iu" for size in (1, 2, 4, 8)))
@@ -100,7 +101,8 @@ def _xyz(content: bytes) -> RawCloud:
     if rows.shape[1] not in (3, 6):
         raise InputError(f"its lines have {rows.shape[1]} numbers; give three (x y z) or six (with nx ny nz).")
     points, more = rows[:, :3].copy(), rows[:, 3:].copy()
-    colored = more.size and more.max() > 1.0 and more.min() >= 0.0 and more.max() <= 255.0 and np.all(more % 1.0 == 0.0)
+    length = np.linalg.norm(more, axis=1)
+    colored = np.all((more >= 0.0) & (more <= 255.0)) and np.any((length > 0.0) & (np.abs(length - 1.0) > _ROUNDED))
     return RawCloud(points, more if more.size and not colored else None, None)
 
 

@@ -29,6 +29,7 @@ _LARGEST, _SMALLEST = 0.6, 0.005  # extent of what a hand can grasp [m]
 _NEIGHBORS: Final = 12
 _LEAST_NOISE: Final = 0.0003  # of a thinned point [m]
 _APART: Final = 0.012  # gap between two objects [m]
+_INWARD: Final = 0.3  # of what all of them would be: less is a thin wall, of which both sides are seen
 _NEAREST, _FARTHEST = 0.01, 10.0  # of a camera that sees an object of a hand's size [m]
 
 
@@ -67,7 +68,7 @@ def cleaned(
         (n, 3) m; rows that are not finite are dropped.
     normals
         (n, 3) of any length; estimated from neighbors if not given. Their sign is set towards the camera if that is
-        known; else, of estimated ones, away from the middle of the cloud.
+        known; else, of estimated ones, away from the middle of the cloud, and given ones that point to it are refused.
     camera
         (3,) m, where the cloud was seen from.
     noise
@@ -78,7 +79,8 @@ def cleaned(
     Raises
     ------
     InputError
-        If too few points are left, they lie on a line, the unit is wrong, or there are two objects.
+        If too few points are left, they lie on a line, the unit is wrong, there are two objects, or the normals point
+        inwards.
     """
     notes: list[str] = []
     if normals is not None:
@@ -130,6 +132,8 @@ def cleaned(
         outward = np.where(np.linalg.norm(points[:, 3:], axis=1)[:, None] > 1e-6, given, outward)
         if camera is not None:
             outward *= np.where(np.sum(outward * (camera - place), axis=1) < 0.0, -1.0, 1.0)[:, None]
+        else:
+            _check_outward(place, outward)
     sigma = float(np.median(scatter)) if noise is None else float(noise)
     place, outward, count = _thinned(place, outward, most)
     if len(place) < len(points):
@@ -154,6 +158,20 @@ def _check_unit(points: Array) -> None:
     if not _SMALLEST <= size <= 4.0:
         spans = f"{size:.3g} m" if size > 4.0 else f"{1e3 * size:.3g} mm"
         raise InputError(f"the cloud spans {spans}; give the unit of its numbers: --unit mm, cm, m or in.")
+
+
+def _check_outward(points: Array, normals: Array) -> None:
+    """Refuse normals that point inwards: a ball was learnt as one of half the size more.
+
+    By the divergence theorem the mean of normal . point is three volumes by the area of a closed surface. A hollow that
+    is seen from its opening looks the same; there the camera tells.
+    """
+    along = np.sum(normals * (points - points.mean(axis=0)), axis=1)
+    if along.mean() < -_INWARD * np.abs(along).mean():
+        raise InputError(
+            f"{100.0 * float(np.mean(along < 0.0)):.0f} % of the normals point to the middle of the cloud; turn them "
+            "outwards, leave --normals out, or give --camera x,y,z, towards which they are turned."
+        )
 
 
 def _even_part(points: Array) -> Array:
