@@ -102,3 +102,13 @@ def test_bad_files_are_refused_in_one_line(tmp_path, text, words):
     with pytest.raises(InputError, match=words) as caught:
         read_grasps(tmp_path / "g.json")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("key", ["names", "confidences", "postures"])
+@pytest.mark.parametrize(("value", "words"), [([], "holds 0"), ([0.5, 0.5], "holds 2"), (0.5, "is float")])
+def test_what_stands_beside_the_transforms_is_not_passed_over(tmp_path, key, value, words):
+    """Confidences of another number of grasps were taken for 1, postures for 0."""
+    grasps = {"transforms": [np.eye(4).tolist()], "object_in_gripper": [True], key: value}
+    (tmp_path / "g.json").write_text(json.dumps({"grasps": grasps}))
+    with pytest.raises(InputError, match=f"grasps.{key} {words}; give a list of 1"):
+        read_grasps(tmp_path / "g.json")

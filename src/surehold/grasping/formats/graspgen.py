@@ -77,14 +77,10 @@ def graspgen_file(where: str, content: Any) -> GraspFile:
             f"{where!r} is not a GraspGen file; it must hold grasps.transforms and as many grasps.object_in_gripper."
         )
     n = len(transforms)
-    names, confidences = grasps.get("names"), grasps.get("confidences")
-    if not isinstance(names, list) or len(names) != n:
-        names = [f"grasp_{i}" for i in range(n)]
-    if not isinstance(confidences, list) or len(confidences) != n:
-        confidences = [_success(good, i, where) for i, good in enumerate(success)]
-    postures = grasps.get("postures")
-    if not isinstance(postures, list) or len(postures) != n:
-        postures = [0.0] * n
+    names = _beside(grasps, "names", n, where) or [f"grasp_{i}" for i in range(n)]
+    confidences = _beside(grasps, "confidences", n, where)
+    confidences = confidences or [_success(good, i, where) for i, good in enumerate(success)]
+    postures = _beside(grasps, "postures", n, where) or [0.0] * n
     stored = []
     for name, confidence, transform, s1 in zip(names, confidences, transforms, postures, strict=True):
         place = f"{where!r}, grasp {str(name)[:60]!r}"
@@ -104,6 +100,17 @@ def graspgen_file(where: str, content: Any) -> GraspFile:
             settings=options_of(content, repr(where)),
         )
     )
+
+
+def _beside(grasps: dict[str, Any], key: str, n: int, where: str) -> list[Any]:
+    """Return what stands beside the transforms, an empty list where nothing does."""
+    found = grasps.get(key)
+    if found is not None and (not isinstance(found, list) or len(found) != n):
+        there = f"holds {len(found)}" if isinstance(found, list) else f"is {type(found).__name__}"
+        raise InputError(
+            f"{where!r}: grasps.{key} {there}; give a list of {n}, one for each transform, or leave it out."
+        )
+    return found or []
 
 
 def _success(good: Any, number: int, where: str) -> float:
