@@ -16,6 +16,7 @@ from surehold.grasping.hand.configuration import HandConfig, read_hand_config
 from surehold.grasping.hand.cover import cover_box, cover_mesh
 from surehold.grasping.hand.files import load_hand
 from surehold.grasping.hand.kinematics import link_ends
+from surehold.grasping.hand.proposal import propose_hand
 from surehold.grasping.hand.synergy import closing_motion
 
 MODEL = """
@@ -348,3 +349,18 @@ def test_default_classes_are_resolved(tmp_path):
         )
         hands.append(load_hand(tmp_path / "hand.xml", config))
     assert all(np.array_equal(a, b) for a, b in zip(*(hand.arrays() for hand in hands), strict=True))
+
+
+def test_a_range_whose_ends_are_exchanged_is_refused(tmp_path):
+    """MuJoCo takes such a joint as one without limits, and hands opened and closed beyond its end."""
+    joint = '<joint name="{0}" axis="0 {1} 0" range="{2}"/><geom type="box" size=".01 .008 .03" pos="0 0 .03"/>'
+    fingers = [
+        f'<body pos="{x} 0 0">{joint.format(name, axis, ends)}</body>'
+        for x, name, axis, ends in ((-0.04, "a", 1, "0 80"), (0.04, "b", -1, "80 0"))
+    ]
+    path = tmp_path / "hand.xml"
+    path.write_text(f'<mujoco><worldbody><body name="palm">{"".join(fingers)}</body></worldbody></mujoco>')
+    with pytest.raises(InputError, match="joint 'b' has the range 80 to 0; give the lower first"):
+        propose_hand(path)
+    path.write_text(path.read_text().replace("80 0", "0 80"))
+    assert propose_hand(path).ranges["b"] == pytest.approx((0.0, np.radians(80.0)))

@@ -108,6 +108,12 @@ def _compiled(mujoco: Any, path: Path) -> Any:
                 spec = mujoco.MjSpec.from_string(text, assets=assets)
             else:
                 spec = mujoco.MjSpec.from_file(str(path))
+            for joint in spec.joints:  # MuJoCo takes it as one without limits
+                if joint.limited == mujoco.mjtLimited.mjLIMITED_AUTO and joint.range[0] > joint.range[1]:
+                    low, high = joint.range
+                    raise InputError(
+                        f"{str(path)!r}: joint {joint.name!r} has the range {low:g} to {high:g}; give the lower first."
+                    )
             spec.compiler.fusestatic = False  # bodies keep their names
             # Nothing moves by forces here: inertias that no body can have shall not refuse a hand.
             spec.compiler.balanceinertia, spec.compiler.boundmass, spec.compiler.boundinertia = True, 1e-6, 1e-12
