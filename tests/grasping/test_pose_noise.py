@@ -28,11 +28,16 @@ def shifts(simulator, pose, poses):
 
 def test_the_disturbance_is_a_truncated_normal_about_the_grasp_center(bottle):
     pose = pose_at(bottle, -0.03)
-    moved, turned = shifts(bottle, pose, disturbed_poses(bottle, pose, n=4000))
+    poses = disturbed_poses(bottle, pose, n=4000)
+    moved, turned = shifts(bottle, pose, poses)
     assert np.abs(moved).max() <= 0.010
     assert turned.max() <= np.radians(5.0) * np.sqrt(3.0) + 1e-9
     for axis in range(3):
         assert stats.kstest(moved[:, axis], stats.truncnorm(-3, 3, scale=0.010 / 3).cdf).pvalue > 1e-3
+    turns = [Rotation.from_matrix(pose.rotation.T @ p[:, :3]).as_euler("XYZ") for p in poses]
+    for angles in np.transpose(turns):
+        assert stats.kstest(angles, stats.truncnorm(-3, 3, scale=np.radians(5.0) / 3).cdf).pvalue > 1e-3
+    assert len(disturbed_poses(bottle, pose)) == 24
     only_turns, _ = shifts(bottle, pose, disturbed_poses(bottle, pose, PoseNoise(shift=0.0), n=50))
     np.testing.assert_allclose(only_turns, 0.0, atol=1e-12)
 

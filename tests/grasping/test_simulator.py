@@ -1,4 +1,5 @@
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,11 @@ from surehold.grasping import (
     grasp_batch,
     grasp_scene,
     robust_quality,
+    shipped_object,
     wrench_quality,
 )
+from surehold.grasping.object.model import GraspObject
+from surehold.grasping.object.solids import Tube, triangles
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +116,51 @@ def test_a_collision_costs_more_the_deeper_it_is(simulator):
     assert values[0] > -0.02
     plain = Simulator(obj="mug", collision="zero").grasp(pose_of(simulator, dx=0.0), -0.7)
     assert (plain.status, plain.quality) == ("initial collision", 0.0)
+
+
+def test_a_collision_is_worth_what_all_bodies_are_inside_together(simulator):
+    for x in (-0.038, -0.03, 0.0):
+        grasp = simulator.grasp(pose_of(simulator, dx=x), -0.7)
+        depths = np.maximum(-simulator.gaps(grasp.pose, grasp.open_joints), 0.0)
+        assert np.sum(depths > 0.0) > 1
+        assert grasp.penetration == depths.max()
+        assert grasp.quality == pytest.approx(-0.05 * (1.0 - np.exp(-depths.sum() / 0.02)), rel=1e-12)
+
+
+def test_the_friction_is_that_given_else_that_of_the_hand_else_that_of_the_object(simulator):
+    sticky = replace(simulator.hand, friction=0.9)
+    assert Simulator(simulator.hand, "drill").friction == shipped_object("drill").friction == 0.7
+    assert Simulator(sticky, "drill").friction == Simulator(sticky, "drill").measure.friction == 0.9
+    assert Simulator(sticky, "drill", friction=0.3).friction == 0.3
+
+
+def test_one_contact_is_none_and_counts_by_the_gaps_of_the_fingers():
+    options = {"obj": "mug", "contact": "single", "quality": "signed_epsilon", "depth": 0.0005}
+    simulator = Simulator(**options)
+    grasp = simulator.grasp(pose_of(simulator, standoff=0.072), -0.7)
+    assert (grasp.status, len(grasp.contacts), grasp.touching) == ("no contact", 1, ("thumb distal",))
+    gaps = simulator.gaps(grasp.pose, grasp.joints)[:-1].reshape(5, 4).min(axis=1).clip(0.0)
+    away = gaps.mean() / simulator.object.torque_length
+    assert grasp.quality == pytest.approx(-0.05 * np.log1p(away / 0.05), rel=1e-12)
+    (alone,) = grasp_batch(simulator, [grasp.pose], -0.7).quality
+    assert alone == grasp.quality
+    assert len(simulator.contacts_at(grasp.pose, grasp.joints)) == 1
+    assert simulator.quality_at(grasp.pose, grasp.joints) == grasp.quality
+    motion = Pose((0.3, -0.2, 0.1), (0.5, 0.5, 0.5, -0.5))
+    there = Simulator(**options, object_pose=motion)
+    assert there.grasp(motion @ grasp.pose, -0.7).quality == pytest.approx(grasp.quality, abs=1e-9)
+
+
+def test_distances_are_exact_as_far_as_thick_fingers_feel_from_their_axes(simulator):
+    """Beyond the grid of the distance field there is no object, but its box."""
+    solids = (Tube(((0.0, 0.0, -0.001), (0.0, 0.0, 0.001)), 0.005),)
+    vertices, faces, volume, center = triangles(solids)
+    pill = GraspObject("pill", vertices, faces, 1000.0 * volume, center, solids=solids)
+    thick = replace(simulator.hand, radii=np.full((5, 4), 0.02))
+    around = np.radians(np.arange(0.0, 360.0, 15.0))
+    ring = np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])
+    field = Simulator(thick, pill, depth=0.008).field
+    np.testing.assert_allclose(field.distance((0.005 + 0.02 + 0.008) * ring), 0.028, atol=1e-5)
 
 
 def test_scene_holds_watertight_bodies_in_the_world(simulator):

@@ -3,7 +3,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from surehold.grasping.closing.contacts import DEPTH, add_outcome, end_mixture, pass_share
+from surehold.grasping.closing.contacts import DEPTH, SKIN, add_outcome, end_mixture, pass_share
+from surehold.grasping.hand.kinematics import link_frames
+from surehold.grasping.hand.skin import skin_samples
 from surehold.grasping.object.solids import signed_distance
 from surehold.grasping.poses import default_pose
 from surehold.grasping.simulator import Simulator
@@ -76,6 +78,34 @@ def test_a_palm_that_lies_on_the_object_is_felt():
     assert gaps.min() == pytest.approx(0.0, abs=1e-6)
     assert np.argmin(gaps) == simulator.hand.palm
     assert simulator.hand.palm in simulator.grasp(pose, 0.9).contacts.bodies
+
+
+@pytest.mark.parametrize("depth", [DEPTH, DEPTH / 2])
+@pytest.mark.parametrize(
+    ("name", "mode", "standoff", "dx", "s1"),
+    [("mug", "right-front", 0.021, -0.06, -0.7), ("drill", "front-top", 0.014, 0.0, 0.9)],  # the palm 1 mm away
+)
+def test_a_hand_at_rest_feels_each_sample_of_its_skin_by_the_exact_distance(name, mode, standoff, dx, s1, depth):
+    """The weight is 1 - d / depth; point and normal are those of the surface nearest to a place below the skin."""
+    simulator = Simulator(obj=name, depth=depth)
+    hand, solids = simulator.hand, simulator.object.solids
+    grasp = simulator.grasp(default_pose(hand, simulator.object, mode, standoff, (dx, *[0.0] * 5)), s1)
+    assert grasp.status != "initial collision"
+    felt = simulator.contacts_at(grasp.pose, grasp.joints)
+    bodies, skin = np.split(skin_samples(hand), [1], axis=1)
+    frames = np.concatenate([link_frames(hand.bases, hand.chains, grasp.joints), np.eye(3, 4)[None]])
+    frames = frames[bodies[:, 0].astype(int)]
+    places = np.einsum("mij,mj->mi", frames[:, :, :3], skin[:, :3]) + frames[:, :, 3]
+    below = grasp.pose.apply(places - SKIN * np.einsum("mij,mj->mi", frames[:, :, :3], skin[:, 3:]))
+    distance = signed_distance(solids, grasp.pose.apply(places))[0]
+    near = distance < depth
+    assert near.sum() > 15
+    assert (hand.palm in felt.bodies) == (name == "drill")
+    np.testing.assert_array_equal(felt.bodies, bodies[near, 0])
+    np.testing.assert_allclose(felt.weights, np.minimum(1.0 - distance[near] / depth, 1.0), atol=1e-3)
+    beneath, outward = signed_distance(solids, below[near])
+    np.testing.assert_allclose(felt.points, below[near] - beneath[:, None] * outward, atol=1e-5)
+    np.testing.assert_allclose(felt.normals, -outward, atol=2e-3)
 
 
 @pytest.mark.parametrize("dy", [-0.01, 0.0, 0.015])
