@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from surehold.errors import InputError
-from surehold.grasping import OBJECTS, STATUSES, Simulator, default_pose, grasp_batch
+from surehold.grasping import OBJECTS, STATUSES, Pose, Simulator, default_pose, grasp_batch
 from surehold.grasping.hand.named import hand_named
 from surehold.grasping.hand.synergy import preshape_of
 from surehold.grasping.trial_loop import UNDECIDED, run_trials
@@ -43,6 +43,20 @@ def test_a_batch_is_its_trials_and_sound(name):
         assert STATUSES[batch.status[i]] == grasp.status
         assert batch.penetration[i] == grasp.penetration
         assert batch.contacts[i] == len(grasp.contacts)
+
+
+def test_a_batch_in_another_world_and_convention_is_its_trials():
+    motion = Pose((0.3, -0.2, 0.1), (0.5, 0.5, 0.5, -0.5))
+    simulator = Simulator(obj="mug", contact="single", convention="unit_magnitude", object_pose=motion)
+    poses, s1 = random_poses(simulator, 150, 7)
+    poses = [motion @ pose for pose in poses]
+    batch = grasp_batch(simulator, poses, s1)
+    assert np.any(batch.quality > 0.0)
+    assert np.any(batch.contacts == 1)
+    grasps = [simulator.grasp(pose, float(posture)) for pose, posture in zip(poses, s1, strict=True)]
+    np.testing.assert_array_equal(batch.quality, [grasp.quality for grasp in grasps])
+    assert [STATUSES[k] for k in batch.status] == [grasp.status for grasp in grasps]
+    np.testing.assert_array_equal(batch.contacts, [len(grasp.contacts) for grasp in grasps])
 
 
 def test_the_number_of_workers_changes_nothing():

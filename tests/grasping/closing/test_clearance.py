@@ -4,6 +4,7 @@ from exact_mesh import ExactMesh, capsule_pair
 from scipy.spatial.transform import Rotation
 
 from surehold.grasping.closing.clearance import (
+    _below,
     box_gap,
     capsule_gap,
     capsule_pair_gap,
@@ -49,6 +50,19 @@ def test_capsule_gap_equals_a_dense_search_of_the_exact_distance(scene):
     assert checked > 5
 
 
+def test_the_distance_between_two_samples_is_never_below_its_bound():
+    """Of a single point, whose distance bends as much as any set's, it is so, and hardly more."""
+    rng = np.random.default_rng(0)
+    for length in (0.001, 0.01, 0.1):
+        for x, off in zip(rng.uniform(-0.1, 0.1, 300), rng.uniform(0.0, 0.05, 300), strict=True):
+            lowest = np.hypot(x - np.clip(x, 0.0, length), off)
+            assert _below(np.hypot(x, off), np.hypot(x - length, off), length) <= lowest + 1e-15
+    for length in (0.001, 0.002, 0.004):
+        ends = np.hypot(0.5 * length, 0.02)
+        drop = ends - 0.02
+        assert ends - _below(ends, ends, length) == pytest.approx(drop, rel=1.5 * length / 0.02)
+
+
 def test_capsule_gap_equals_the_exact_mesh_distance(scene):
     obj, field = scene
     exact, checked = ExactMesh(obj), 0
@@ -76,16 +90,17 @@ def test_palm_gap_equals_the_exact_mesh_distance(scene):
             assert exact.box(pose, half, rounding) > 0.0099
 
 
-def test_an_object_wholly_inside_the_palm_is_a_collision():
-    """No face of the box comes near it: the sphere's center tells, in closed form."""
-    radius, half, rng = 0.004, np.array([0.040, 0.0335, 0.015]), np.random.default_rng(6)
+@pytest.mark.parametrize("radius", [0.004, 0.0015])
+def test_an_object_wholly_inside_the_palm_is_a_collision(radius):
+    """No face of the box comes near it: the sphere's center tells, in closed form, as it does beside the box."""
+    half, rng = np.array([0.040, 0.0335, 0.015]), np.random.default_rng(6)
     axis = 0.001 * np.arange(-20, 21)
     places = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     away = np.linalg.norm(places, axis=-1, keepdims=True)
     nodes = np.concatenate([away - radius, places / np.where(away > 0.0, away, 1.0)], axis=-1).astype(np.float32)
     frame = np.concatenate([np.full(3, axis[0]), [0.001], np.full(3, -radius), np.full(3, radius)])
-    inside = 0
-    for _ in range(200):
+    inside, beside = 0, 0
+    for _ in range(400):
         turn = Rotation.random(rng=rng).as_matrix()
         center = rng.uniform(-1.2, 1.2, 3) * half
         pose = np.column_stack([turn, -turn @ center])  # of the box, with the sphere at `center` in its axes
@@ -94,7 +109,11 @@ def test_an_object_wholly_inside_the_palm_is_a_collision():
         exact = np.linalg.norm(over) - 0.003 - radius
         inside += bool(np.all(over == 0.0))
         assert (gap < 0.0) == (exact < 0.0)
+        if np.any(over > 0.0) and -0.0018 < exact < 0.005:
+            beside += 1
+            assert gap == pytest.approx(exact, abs=1.2e-5)
     assert inside > 50
+    assert beside > 50
 
 
 def test_pair_gap_equals_an_independent_library():

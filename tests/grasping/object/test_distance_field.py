@@ -7,6 +7,7 @@ from surehold.errors import InputError
 from surehold.grasping.object.distance_field import MARGIN, DistanceField, cache_folder, distance_field_of
 from surehold.grasping.object.mesh_distance import FAR_INSIDE, FAR_OUTSIDE
 from surehold.grasping.object.mesh_files import load_mesh
+from surehold.grasping.object.model import GraspObject
 from surehold.grasping.object.shipped import OBJECTS, shipped_object
 from surehold.grasping.object.solids import signed_distance
 
@@ -95,6 +96,25 @@ def test_mesh_without_solids_has_the_same_field(tmp_path, monkeypatch):
     near = (exact.nodes[..., 0] > -FAR_INSIDE) & (exact.nodes[..., 0] < FAR_OUTSIDE)
     assert np.abs(error[near]).max() < 2e-5
     assert np.abs(error).max() < 0.25 * 0.006, "beyond, distances may be a bit too large"
+    assert not np.array_equal(bare.nodes, exact.nodes), "the one is not read from the other's file"
+
+
+def test_a_mesh_with_a_dent_has_a_field_of_its_own(tmp_path, monkeypatch):
+    pytest.importorskip("igl")
+    trimesh = pytest.importorskip("trimesh")
+    monkeypatch.setenv("SUREHOLD_CACHE", str(tmp_path))
+    ball = trimesh.creation.icosphere(2, 0.02)
+    corner = int(np.argmax(ball.vertices.sum(axis=1)))
+    dented = ball.vertices.copy()
+    dented[corner] *= 0.85  # the box stays the same
+    places = 1.1 * np.vstack([ball.vertices[corner], -ball.vertices[corner]])
+    found = []
+    for vertices in (ball.vertices, dented):
+        obj = GraspObject("ball", np.array(vertices), np.array(ball.faces, dtype=np.int32), 0.1, np.zeros(3))
+        found.append(distance_field_of(obj, 0.002).distance(places))
+    assert found[0] == pytest.approx([0.002, 0.002], abs=2e-4)
+    assert found[1][0] > 0.0025
+    assert found[1][1] == found[0][1]
 
 
 @pytest.mark.parametrize("subdivided", [False, True])

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
 from surehold.grasping import Pose, Simulator, default_pose, shipped_object
 from surehold.grasping.hand.configuration import read_hand_config
 from surehold.grasping.hand.files import load_hand
-from surehold.grasping.physics.check import LOADS, RATED, GraspChecker
+from surehold.grasping.physics.check import LOADS, RATED, GraspChecker, _accelerations, _motion, _verdict
 
 
 @pytest.fixture(scope="module")
@@ -141,6 +142,44 @@ def test_the_verdict_does_not_depend_on_where_the_world_is(bottle, checker):
     here, moved = checker.check(bottle.grasp(pose, -0.7)), checker.check(there.grasp(motion @ pose, -0.7))
     assert moved.verdict == here.verdict
     assert (moved.settled, moved.settled_quality) == pytest.approx((here.settled, here.settled_quality), rel=0.02)
+
+
+def test_the_loads_are_gravity_each_way_and_a_shake_along_each_axis():
+    phases = np.array([_accelerations(phase) for phase in range(12)])
+    assert LOADS[:6] == tuple(f"gravity {sign}{axis}" for axis in "xyz" for sign in "+-")
+    for load, expected in zip(np.moveaxis(phases, 1, 0), np.repeat(np.eye(3), 2, axis=0), strict=False):
+        np.testing.assert_array_equal(np.abs(load), np.tile(9.81 * expected, (12, 1)))
+    np.testing.assert_array_equal(phases[:, 0:6:2], -phases[:, 1:6:2])
+    shake = phases[:, 6] - phases[:, 0]  # it weighs along +x
+    seconds, ways = np.repeat(np.arange(3), 4), np.tile([5.0, 5.0, -5.0, -5.0], 3)
+    np.testing.assert_allclose(shake, np.eye(3)[seconds] * ways[:, None], atol=1e-12)
+
+
+def test_motions_are_those_of_the_center_of_mass_and_of_the_turn(checker):
+    """A rigid body turned about any point, by SciPy's rotations; q and -q are the same turn."""
+    rng, model = np.random.default_rng(0), checker.model
+    before, after = np.zeros((2, 40, 1 + model.nq + model.nv))
+    first, turn = Rotation.random(40, rng=rng), Rotation.random(40, rng=rng)
+    places, shifts = rng.uniform(-0.2, 0.2, (2, 40, 3))
+    signs = rng.choice([-1.0, 1.0], (40, 1))
+    pose = slice(model.nq - 6, model.nq + 1)
+    before[:, pose] = np.hstack([places, first.as_quat(scalar_first=True)])
+    after[:, pose] = np.hstack([shifts, signs * (turn * first).as_quat(scalar_first=True)])
+    far, turned = _motion(model, before, after)
+    center = model.body_ipos[-1]
+    expected = shifts + (turn * first).apply(center) - places - first.apply(center)
+    np.testing.assert_allclose(far, np.linalg.norm(expected, axis=1), atol=1e-12)
+    np.testing.assert_allclose(turned, turn.magnitude(), atol=1e-7)
+
+
+def test_verdicts_are_those_of_the_stated_limits():
+    degree = np.pi / 180.0
+    assert [_verdict(m, t) for m, t in ((0.0099, 19.9 * degree), (0.0101, 0.0), (0.0, 20.1 * degree))] == [
+        "held",
+        "slipped",
+        "slipped",
+    ]
+    assert [_verdict(m, t) for m, t in ((0.0499, 3.0), (0.0501, 0.0))] == ["slipped", "dropped"]
 
 
 @pytest.mark.parametrize("name", ["bottle", "drill"])

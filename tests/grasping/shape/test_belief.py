@@ -2,11 +2,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
+from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
 from surehold.grasping.object.distance_field import distance_field_of
-from surehold.grasping.shape.belief import ShapeBelief, grid_of
+from surehold.grasping.shape.belief import REACH, ShapeBelief, _Waves, grid_of
 from surehold.grasping.shape.implicit_surface import Observations, surface_of
+from surehold.grasping.shape.level_set import Grid
 from surehold.grasping.shape.prior import PriorShape
 
 BOX = PriorShape("box", np.zeros(3), np.eye(3), np.array([0.03, 0.03, 0.04]))
@@ -24,8 +27,6 @@ def belief():
 
 
 def test_draws_have_mean_and_deviation_of_the_posterior(belief):
-    from surehold.grasping.shape.level_set import Grid
-
     grid = Grid(np.full(3, -0.03), 0.02, (3, 3, 3))
     values = ShapeBelief(belief.surface, grid).values(3000, np.random.default_rng(1)).reshape(3001, -1)
     mean, std = belief.surface.value(grid.nodes), belief.surface.deviation(grid.nodes)
@@ -34,6 +35,37 @@ def test_draws_have_mean_and_deviation_of_the_posterior(belief):
     # 400 waves share their frequencies: the kernel itself is off by about 1 / sqrt(400).
     assert np.abs(draws.mean(axis=0) - mean).max() < 0.1 * std.max()
     assert draws.std(axis=0) == pytest.approx(std, abs=0.12 * belief.surface.std)
+
+
+def test_draws_vary_by_the_noise_of_what_was_measured():
+    """A value and a slope, each measured as well as it was known before: their variance is half of that."""
+    std, length = 0.006, 0.03
+    steepness = np.sqrt(5.0 / 3.0) * std / length  # standard deviation of a slope before
+    places = np.array([[-0.5, 0.0, 0.0], [0.001, 0.0, 0.0]])
+    told = Observations(places[:1], np.zeros(1), np.full(1, std), places[1:], np.eye(3)[:1], np.full(1, steepness))
+    surface = surface_of(BOX, told, std, length)
+    rng = np.random.default_rng(2)
+    at = ShapeBelief(surface, Grid(places[0], 0.002, (1, 1, 1))).values(4000, rng)[1:, 0, 0, 0]
+    beside = ShapeBelief(surface, Grid(np.zeros(3), 0.001, (3, 1, 1))).values(4000, rng)[1:, :, 0, 0]
+    slope = (beside[:, 2] - beside[:, 0]) / 0.002
+    assert at.std() == pytest.approx(np.sqrt(0.5) * std, rel=0.05)
+    assert slope.std() == pytest.approx(np.sqrt(0.5) * steepness, rel=0.05)
+
+
+def test_waves_are_those_of_the_spectral_density(belief):
+    """Of Matérn-5/2 a t-distribution of 5 degrees of freedom: a third of |o|^2 l^2 has an F-distribution."""
+    o = np.vstack([_Waves(belief.surface, 1, np.random.default_rng(seed))._o for seed in range(20)])
+    squared = np.sum(o * o, axis=1) * belief.surface.length**2
+    assert stats.kstest(squared / 3.0, stats.f(3, 5).cdf).pvalue > 1e-3
+    assert stats.kstest(o[:, 1] * belief.surface.length, stats.t(5).cdf).pvalue > 1e-3
+
+
+def test_the_grid_reaches_beyond_what_was_measured_outside_of_the_prior_shape():
+    for side in (-1.0, 1.0):
+        told = Observations(np.array([[side * 0.09, side * 0.02, side * 0.1]]), np.zeros(1), np.full(1, 5e-4))
+        grid = grid_of(surface_of(BOX, told, 0.006, 0.03), 0.004)
+        finger = told.points + REACH * np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+        assert np.all(grid.gap(finger) == 0.0)
 
 
 def test_draws_pass_through_what_was_measured(belief):
@@ -81,12 +113,21 @@ def test_values_between_coarse_nodes_are_those_of_all_nodes_near_the_surface(bel
     assert np.array_equal(values < 0.0, exact < 0.0)
 
 
-def test_mass_and_center_of_a_box(belief):
+@pytest.mark.parametrize("cell", [0.002, 0.0023, 0.0037])
+def test_mass_and_center_of_a_box(cell):
     surface = surface_of(BOX, Observations(), 0.006, 0.03)
-    obj = ShapeBelief(surface, grid_of(surface, 0.002)).mean_object()
+    obj = ShapeBelief(surface, grid_of(surface, cell)).mean_object()
     volume = 8.0 * np.prod(BOX.half)  # round edges take a little
     assert 0.93 * volume < obj.mass / 1000.0 < volume
-    assert np.abs(obj.center_of_mass).max() < 1e-4
+    assert np.abs(obj.center_of_mass).max() < 3e-5
+    assert obj.box_half_extents == pytest.approx(BOX.half, abs=2e-4)
+
+
+def test_a_box_that_is_turned_keeps_its_axes():
+    turned = replace(BOX, axes=Rotation.from_euler("xyz", [0.4, -0.3, 0.6]).as_matrix())
+    surface = surface_of(turned, Observations(), 0.006, 0.03)
+    obj = ShapeBelief(surface, grid_of(surface, 0.002)).mean_object()
+    assert np.array_equal(obj.axes, turned.axes)
     assert obj.box_half_extents == pytest.approx(BOX.half, abs=2e-4)
 
 
@@ -97,7 +138,7 @@ def test_no_draw_fills_what_is_free(belief):
     wild = ShapeBelief(surface, belief.grid)
     mean, *draws = wild.values(6, np.random.default_rng(0)).reshape(7, -1)
     assert np.sum(np.array(draws)[:, within] < 0.0) > 0
-    free = replace(wild, free=np.append(place, [[0.012]], axis=1))
+    free = replace(wild, free=np.array([[*place[0], 0.012], [0.3, 0.0, 0.0, 0.001]]))
     same, *lifted = free.values(6, np.random.default_rng(0)).reshape(7, -1)
     assert np.all(np.array(lifted)[:, within] >= 0.0)
     assert np.array_equal(mean, same)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from surehold.errors import InputError
 from surehold.grasping.object.distance_field import distance_field_of
@@ -65,6 +66,27 @@ def test_a_shape_ends_where_nothing_was_seen_below_it():
     obj, _, cloud = seen("glass")
     assert cloud.table is None
     assert belief_of_cloud(cloud).mean_object().box_half_extents[2] < 1.18 * obj.box_half_extents[2]
+
+
+def test_an_object_stands_on_its_table_however_that_is_turned():
+    """The lowest 4 mm count to the table, and the camera stands above."""
+    obj, rng = shipped_object("bottle"), np.random.default_rng(0)
+    camera = camera_towards(obj, 0.7, 0.6)
+    table = np.column_stack([rng.uniform(-0.15, 0.15, (1200, 2)), rng.normal(0.0, 0.0005, 1200)])
+    points = np.vstack([half_view(obj, camera, 400, 0.001, rng), table])
+    turn, shift = Rotation.from_euler("xyz", [0.5, -0.4, 0.8]).as_matrix(), np.array([0.1, 0.05, 0.3])
+    cloud = cleaned(points @ turn.T + shift, camera=turn @ camera + shift)
+    assert cloud.table is not None
+    assert cloud.table.normal == pytest.approx(turn[:, 2], abs=2e-3)
+    belief = belief_of_cloud(cloud)
+    box, mean = belief.surface.first, belief.mean_object()
+    assert mean.axes.T @ cloud.table.normal == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert box.center @ cloud.table.normal - box.half[2] == pytest.approx(cloud.table.height, abs=1e-9)
+    height = mean.vertices @ cloud.table.normal - cloud.table.height
+    assert -0.004 < height.min() < 0.001
+    assert height.max() == pytest.approx(0.160, abs=0.003)
+    assert mean.mass == pytest.approx(obj.mass, rel=0.15)
+    assert (mean.center_of_mass - shift) @ turn == pytest.approx(obj.center_of_mass, abs=0.004)
 
 
 @pytest.mark.parametrize("prior", ["box", "ellipsoid"])
