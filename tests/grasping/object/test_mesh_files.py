@@ -106,10 +106,32 @@ def test_the_box_of_a_part_is_the_same_however_its_file_turns_it(tmp_path, mesh,
         assert np.linalg.det(part.axes) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("angle", "turned"), [(0.0023, False), (0.0092, True)])
+def test_a_box_is_turned_where_that_makes_it_smaller_by_a_hundredth(tmp_path, angle, turned):
+    """Turned by a small angle the box about 60 x 40 mm grows by (60^2 + 40^2) / (60 40) of it: by 0.5 %, or 2 %."""
+    mesh = box()
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(angle, (0, 0, 1)))
+    loaded = load_mesh(stored(tmp_path, mesh), "mm")
+    expected = Rotation.from_rotvec([0.0, 0.0, angle * turned]).as_matrix()
+    np.testing.assert_allclose(loaded.object.axes, expected, atol=1e-5)
+    assert ("its box is turned" in loaded.diagnosis) == turned
+
+
 def test_axes_of_a_body_of_revolution_are_those_of_the_file(tmp_path):
     mesh = trimesh.creation.cylinder(20.0, 100.0, sections=32)
     part = load_mesh(stored(tmp_path, mesh), "mm", frame="principal").object
     np.testing.assert_allclose(part.axes, np.eye(3), atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_axes_across_a_body_of_revolution_lie_nearest_to_those_of_the_file(tmp_path, seed):
+    """No turn about the body's own axis brings them nearer, measured by the trace of the rotation."""
+    turn, mesh = Rotation.random(rng=seed).as_matrix(), trimesh.creation.cylinder(20.0, 100.0, sections=64)
+    mesh.apply_transform(np.block([[turn, np.zeros((3, 1))], [0, 0, 0, 1]]))
+    axes = load_mesh(stored(tmp_path, mesh), "mm", frame="principal").object.axes
+    assert np.abs(axes.T @ turn[:, 2]).max() == pytest.approx(1.0, abs=1e-6)
+    turns = Rotation.from_rotvec(np.linspace(-np.pi, np.pi, 721)[:, None] * turn[:, 2]).as_matrix()
+    assert np.trace(axes) == pytest.approx(np.trace(turns @ axes, axis1=1, axis2=2).max(), abs=1e-4)
 
 
 def test_units_are_lengths(tmp_path):

@@ -108,3 +108,18 @@ def test_an_unknown_prior():
     _, _, cloud = seen("bottle")
     with pytest.raises(InputError, match="did you mean 'mirror'"):
         belief_of_cloud(cloud, "miror")
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ({"cell": -0.002}, "grid cell is -0.002; give a positive length"),
+        ({"cell": float("nan")}, "grid cell is nan"),
+        ({"spread": (0.0, 0.4)}, r"spread is \(0.0, 0.4\); give two positive numbers"),
+        ({"drawn": (0.4, float("inf"))}, "drawn is"),
+    ],
+)
+def test_lengths_that_are_none_are_refused(option, said):
+    _, _, cloud = seen("bottle", n=60)
+    with pytest.raises(InputError, match=said):
+        belief_of_cloud(cloud, **option)

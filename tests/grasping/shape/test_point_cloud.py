@@ -105,6 +105,22 @@ def test_what_no_shape_can_be_learnt_from_is_said_in_one_line(mug, change, said)
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ({"camera": np.array([np.nan, 0.0, 0.0])}, "camera is .* give three finite numbers"),
+        ({"camera": np.array([0.0, np.inf, 0.0])}, "camera is"),
+        ({"camera": np.zeros(2)}, "camera is"),
+        ({"noise": float("nan")}, "noise of the points is nan"),
+        ({"noise": -1.0}, "noise of the points is -1.0; give a standard deviation of 0 m or more"),
+        ({"most": 0}, "most is 0; keep 20 points or more"),  # it never ended
+    ],
+)
+def test_numbers_out_of_range_are_refused(mug, option, said):
+    with pytest.raises(InputError, match=said):
+        cleaned(mug, **option)
+
+
 def fingers(n, rng):
     """Two fingers on both sides of the view, 3 to 10 cm before the camera."""
     view = -CAMERA / np.linalg.norm(CAMERA)

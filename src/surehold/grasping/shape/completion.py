@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.errors import unknown_name
+from surehold.errors import InputError, unknown_name
 from surehold.grasping.shape.belief import ShapeBelief, grid_of
 from surehold.grasping.shape.implicit_surface import Observations, learnt_scales, surface_of
 from surehold.grasping.shape.level_set import grid_around
@@ -93,10 +93,15 @@ def belief_of_cloud(
     Raises
     ------
     InputError
-        If the prior is unknown.
+        If the prior is unknown, or a length is not a positive number.
     """
     if prior not in PRIORS:
         raise unknown_name("prior shape", prior, PRIORS)
+    if cell is not None and not (np.isfinite(cell) and cell > 0.0):
+        raise InputError(f"grid cell is {cell!r}; give a positive length in meters, such as {CELL[2]:g}.")
+    for name_of, pair in (("spread", spread), ("drawn", drawn)):
+        if not (len(pair) == 2 and all(np.isfinite(number) and number > 0.0 for number in pair)):
+            raise InputError(f"{name_of} is {pair!r}; give two positive numbers, such as {SPREAD}.")
     axes = _upright(cloud)
     other = mirrored(cloud, axes) if cloud.camera is not None else None
     everything = cloud.points

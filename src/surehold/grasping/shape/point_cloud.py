@@ -79,9 +79,15 @@ def cleaned(
     Raises
     ------
     InputError
-        If too few points are left, they lie on a line, the unit is wrong, there are two objects, or the normals point
-        inwards.
+        If too few points are left, they lie on a line, the unit is wrong, there are two objects, the normals point
+        inwards, or a number is out of range.
     """
+    if camera is not None and not (np.shape(camera) == (3,) and np.all(np.isfinite(camera))):
+        raise InputError(f"camera is {camera!r}; give three finite numbers, where the cloud was seen from [m].")
+    if noise is not None and not (np.isfinite(noise) and noise >= 0.0):
+        raise InputError(f"noise of the points is {noise!r}; give a standard deviation of 0 m or more, such as 0.001.")
+    if most < _LEAST_POINTS:
+        raise InputError(f"most is {most!r}; keep {_LEAST_POINTS} points or more, such as {MOST_POINTS:,}.")
     notes: list[str] = []
     if normals is not None:
         points = np.column_stack([points, normals])
