@@ -139,6 +139,39 @@ def test_units_are_lengths(tmp_path):
         refused(stored(tmp_path, box()), f"unit '{unit}' is unknown", "mm, cm, m, in", unit=unit)
 
 
+@pytest.mark.parametrize(("unit", "meters"), [("mm", 0.001), ("cm", 0.01), ("m", 1.0), ("in", 0.0254)])
+def test_each_unit_is_its_length_in_meters(tmp_path, unit, meters):
+    part = load_mesh(stored(tmp_path, trimesh.creation.box(np.array([0.06, 0.04, 0.03]) / meters)), unit).object
+    assert sorted(2.0 * part.box_half_extents) == pytest.approx([0.03, 0.04, 0.06], rel=1e-6)
+
+
+def test_thin_plates_are_solids_and_near_corners_stay_apart(tmp_path):
+    plate = load_mesh(stored(tmp_path, trimesh.creation.box((60.0, 40.0, 0.5))), "mm").object
+    assert plate.mass == pytest.approx(0.0012)
+    corner, cut = np.array([30.0, 20.0, 15.0]), 0.004 * np.eye(3)  # a corner broken by 4 micrometers
+    points = np.vstack([box().vertices[~np.all(box().vertices == corner, axis=1)], corner - cut])
+    assert len(load_mesh(stored(tmp_path, trimesh.convex.convex_hull(points), "cut.ply"), "mm").object.vertices) == 10
+
+
+@pytest.mark.parametrize(("triangles", "share"), [(47, 0.089), (58, 0.112)])
+def test_a_tenth_of_the_area_may_be_open(tmp_path, triangles, share):
+    """Of the top, of 2,400 of 10,800 mm^2, in 128 triangles."""
+    mesh = box().subdivide().subdivide().subdivide()
+    top = np.flatnonzero(mesh.triangles_center[:, 2] > 14.99)
+    assert len(top) == 128
+    gone = top[np.argsort(mesh.triangles_center[top, 0], kind="stable")[:triangles]]
+    mesh.update_faces(~np.isin(np.arange(len(mesh.faces)), gone))
+    open_area = triangles * 2400.0 / 128.0
+    assert open_area / (10_800.0 - open_area) == pytest.approx(share, abs=5e-4)
+    path = stored(tmp_path, mesh, "open.ply")
+    if share > 0.1:
+        refused(path, "is an open surface", "of 11 % of its area")
+    else:
+        loaded = load_mesh(path, "mm")
+        assert f"of {open_area:.2g} mm^2" in loaded.diagnosis
+        assert loaded.object.mass == pytest.approx(0.072, rel=1e-6)
+
+
 def test_size_in_mm_and_the_unit_that_would_fit(tmp_path):
     path = stored(tmp_path, box())
     refused(path, "60,000 x 40,000 x 30,000 mm in unit m", "too large", "is its unit mm", unit="m")

@@ -22,6 +22,7 @@ def test_gradient_and_second_derivatives_are_those_of_the_value(kind):
 def test_box_is_the_exact_distance_of_a_rounded_box():
     shape = PriorShape("box", np.zeros(3), np.eye(3), HALF)
     x = np.random.default_rng(1).uniform(-0.08, 0.08, (500, 3))
+    assert shape.value(HALF[None]) == pytest.approx(0.2 * HALF.min() * (np.sqrt(3.0) - 1.0)), "round by a fifth"
     outside = shape.value(x) > 0.0
     exact = signed_distance((RoundedBox((0, 0, 0), tuple(HALF), shape.rounding),), x)[0]
     assert np.abs(shape.value(x) - exact)[outside].max() < 1e-12
