@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from scipy import stats
+from scipy.optimize import minimize
 
 from surehold.grasping.shape.implicit_surface import Observations, learnt_scales, spaced, surface_of
 from surehold.grasping.shape.kernel import covariance, cross_covariance, fast_function_values, function_values
@@ -30,6 +32,32 @@ def test_mean_and_deviation_are_those_of_scikit_learn():
     mean, std = other.predict(x, return_std=True)
     assert surface.value(x) == pytest.approx(PRIOR.value(x) + mean, abs=1e-8)
     assert surface.deviation(x) == pytest.approx(std, abs=1e-7)
+
+
+@pytest.mark.parametrize("stray", [2e-4, 1e-3])
+def test_learnt_scales_are_those_of_highest_density_by_scikit_learn(stray):
+    """Likelihood by scikit-learn, log-normal priors by SciPy; also where the points scatter more than is told."""
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+
+    told = sphere(60)
+    points = told.points * (1.0 + stray / 0.04 * np.random.default_rng(1).standard_normal((60, 1)))
+    size = np.prod(PRIOR.half) ** (1.0 / 3.0)
+
+    def density(logs):
+        std, length, more = np.exp(logs)
+        kernel = ConstantKernel(std**2, "fixed") * Matern(length, "fixed", nu=2.5)
+        process = GaussianProcessRegressor(kernel, alpha=(more * 2e-4) ** 2, optimizer=None)
+        likelihood = process.fit(points, -PRIOR.value(points)).log_marginal_likelihood_value_
+        return likelihood + stats.norm.logpdf(logs, np.log([0.2 * size, size, 1.0]), np.log([1.6, 1.6, 2.0])).sum()
+
+    found = np.log(learnt_scales(PRIOR, Observations(points, told.values, told.noise)))
+    assert found[2] == pytest.approx(0.0, abs=2e-3), "the noise stays what is told"
+    start = np.log([0.2 * size, size])
+    steps = {"initial_simplex": np.array([[0.0, 0.0], [0.4, 0.0], [0.0, 0.4]]) + start}
+    best = minimize(lambda logs: -density([*logs, found[2]]), start, method="Nelder-Mead", options=steps)
+    assert density(found) > -best.fun - 0.1
+    assert learnt_scales(PRIOR, Observations()) == pytest.approx((0.2 * size, size, 1.0))
 
 
 def test_covariances_of_slopes_are_differences_of_those_of_values():
