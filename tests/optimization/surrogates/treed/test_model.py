@@ -431,6 +431,62 @@ def test_averaged_trees_are_the_particles_of_all():
     assert np.all(posterior.with_pending(queries[:1]).moments(queries[:1]).variance < 1e-3 * y.var())
 
 
+def test_whatever_averaged_trees_tell_is_told_tree_after_tree():
+    X, y = data(60)
+    rng = np.random.default_rng(9)
+    process = GaussianProcess(noise="inferred", learning=QUICK)
+    posterior = model(trees=3, process=process).fit(X, y + 0.1 * rng.standard_normal(60)).posterior
+    queries, normals = rng.random((6, 2)), rng.standard_normal((2, 4))
+    points = rng.random((3, 4, 2))
+    for ask in (
+        lambda trees: trees.means(queries),
+        lambda trees: trees.noise_variance(queries),
+        lambda trees: trees.sample(points, normals),
+        lambda trees: trees.left_out().mean,
+        lambda trees: trees.left_out().variance,
+        lambda trees: trees.thinned(2, 1).moments(queries).variance,
+        lambda trees: trees.with_pending(queries[:2]).moments(queries).variance,
+    ):
+        parts = [ask(tree) for tree in posterior.trees]
+        assert not np.array_equal(parts[0], parts[1])
+        assert np.array_equal(ask(posterior), np.concatenate(parts))
+
+
+def test_a_thinned_tree_is_that_of_its_particles():
+    X, y = data(60)
+    posterior, queries = model().fit(X, y).posterior, np.random.default_rng(8).random((20, 2))
+    whole = posterior.moments(queries)
+    for first in range(3):
+        one = posterior.thinned(1, first).moments(queries)
+        assert np.array_equal(one.mean, whole.mean[[first]])
+        assert np.array_equal(one.variance, whole.variance[[first]])
+
+
+def test_one_particle_of_several_trees_is_any_of_theirs():
+    """Thompson sampling draws a function of one particle: of the first tree alone, the others had no say."""
+    X, y = data(60)
+    posterior, queries = model(trees=4).fit(X, y).posterior, np.random.default_rng(8).random((20, 2))
+    whole = posterior.moments(queries).mean
+    singles = [posterior.thinned(1, first).moments(queries).mean for first in range(12)]
+    assert all(len(one) == 1 for one in singles)
+    order = [np.flatnonzero(np.all(whole == one, axis=1))[0] for one in singles]
+    assert sorted(order) == list(range(12)), "each particle of each tree, once"
+
+
+def test_a_trial_on_a_border_is_left_out_of_the_first_leaf_that_has_it():
+    X, y = data(60)
+    posterior = model().fit(X, y).posterior
+    found = posterior.left_out()
+    members = [posterior.partition.nodes[leaf].members for leaf in posterior.partition.leaves]
+    shared = [i for i in range(60) if sum(i in own for own in members) > 1]
+    assert shared
+    for i in shared:
+        j = next(j for j, own in enumerate(members) if i in own)
+        alone, place = posterior.leaves[j].left_out(), int(np.flatnonzero(members[j] == i)[0])
+        assert np.array_equal(found.mean[:, i], alone.mean[:, place])
+        assert np.array_equal(found.variance[:, i], alone.variance[:, place])
+
+
 @pytest.mark.parametrize("settings", [{"min_leaf": "evidence"}, {"trees": 3}])
 def test_options_repeat_themselves_and_take_degenerate_data(settings):
     X, y = data(50)

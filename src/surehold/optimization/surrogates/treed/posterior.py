@@ -183,7 +183,13 @@ class AveragedTrees:
         return np.concatenate([tree.sample(points, normals) for tree in self.trees])
 
     def thinned(self, count: int, first: int = 0) -> "AveragedTrees":
-        """Return the posterior of about `count` of the particles of every tree, from number `first` on."""
+        """Return the posterior of about `count` of the particles of every tree, from number `first` on.
+
+        A single one is that of one tree, and every tree has its turn: whoever draws one function draws one of all.
+        """
+        if count == 1:
+            turn, tree = divmod(first, len(self.trees))
+            return AveragedTrees((self.trees[tree].thinned(1, turn),))
         return AveragedTrees(tuple(tree.thinned(count, first) for tree in self.trees))
 
     def with_pending(self, X: NDArray[np.float64]) -> "AveragedTrees":
