@@ -8,6 +8,7 @@ from scipy.stats import qmc
 
 import surehold as sh
 from surehold.defaults import MANY, NEIGHBORS
+from surehold.errors import SureholdError
 from surehold.optimization.surrogates.gaussian_process.neighbors import NeighborPosterior
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 
@@ -72,6 +73,18 @@ def test_the_nearest_trials_tell_nearly_what_all_do(noise):
     assert miss.max() < 0.01 * np.std(_response(queries)) or np.sqrt(np.mean((miss / deviation) ** 2)) < 0.5
     assert np.all(ours.variance >= theirs.variance - 1e-9), "fewer trials never tell more"
     assert np.median(np.sqrt(ours.variance) / deviation) < 1.5
+
+
+def test_trials_whose_covariance_cannot_be_factorized_give_neither_moments_nor_draws():
+    """A variance that vanishes beside that of the mean; a draw was made of what had lain in memory before."""
+    _, near = _both(300)
+    theta = near.hyperparameters.theta.copy()
+    theta[:, :2], theta[:, -1] = 1.0, -45.0
+    bad = NeighborPosterior(near.evidence._replace(mean_variance=1.0), theta, near.outputs, 0)
+    points = np.array([[[0.5, 0.5], [0.6, 0.5]]])
+    for ask in (lambda: bad.moments(points[0]), lambda: bad.sample(points, np.zeros((1, 2)))):
+        with pytest.raises(SureholdError, match="covariance of the trials"):
+            ask()
 
 
 def test_the_nearest_of_every_set_are_found():

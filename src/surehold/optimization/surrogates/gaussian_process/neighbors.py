@@ -173,7 +173,9 @@ class NeighborPosterior:
             own = self.hyperparameters
             evidence = self.evidence
             shared = evidence.mean_variance, evidence.kernel
-            factorize(X, Y, noise, own.inverse_l, own.s2, own.v, evidence.ratio, *shared, inverse_L, alpha)
+            kernel = own.inverse_l, own.s2, own.v, evidence.ratio, *shared
+            if factorize(X, Y, noise, *kernel, inverse_L, alpha) < 0:
+                raise unfactorized()
             part = np.ascontiguousarray(points[i : i + 1])
             draws[:, i : i + 1] = sample(
                 part, np.ascontiguousarray(normals), X, own.inverse_l, own.s2, *shared, inverse_L, alpha
