@@ -7,9 +7,10 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 import surehold as sh
-from surehold.defaults import LOW_TAIL_FROM
+from surehold.defaults import LOW_TAIL_FROM, MANY_LEARNT
 from surehold.optimization.assembly import assembled
 from surehold.optimization.low_tail import LowTail, low_tail_of
+from surehold.optimization.surrogates.memory import learnt_from
 from surehold.optimization.trials import Trials
 
 
@@ -57,6 +58,17 @@ def test_it_is_chosen_as_an_independent_process_would(response, compressed):
     gain = log_evidence(tail.apply(y)) + tail.log_slopes(y).sum() - log_evidence(y)
     assert (gain > 0.0) == compressed
     assert low_tail_of(X, y) == (tail if compressed else None)
+
+
+def test_it_rests_on_the_trials_that_hyperparameters_are_learnt_from():
+    """One more trial changes nothing until hyperparameters are learnt anew; of many trials every so manieth judges."""
+    X = places(512, 2)
+    y = valley(X)
+    tails = [low_tail_of(X[:n], y[:n]) for n in (64, 67, 68)]
+    assert tails[0] == tails[1] != tails[2]
+    k = learnt_from(450)
+    judges = y[: k : -(-k // MANY_LEARNT)]
+    assert low_tail_of(X[:450], y[:450]) == LowTail(np.median(judges), judges.max() - np.median(judges))
 
 
 @pytest.mark.parametrize("scale", [1e-100, 1e150])
