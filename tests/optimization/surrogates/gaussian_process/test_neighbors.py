@@ -9,6 +9,8 @@ from scipy.stats import qmc
 import surehold as sh
 from surehold.defaults import MANY, NEIGHBORS
 from surehold.errors import SureholdError
+from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning
+from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, correlation
 from surehold.optimization.surrogates.gaussian_process.neighbors import NeighborPosterior
 from surehold.optimization.surrogates.gaussian_process.posterior import GaussianProcessPosterior
 
@@ -147,6 +149,63 @@ def test_gradients_are_those_of_the_values_with_several_neighborhoods(kernel):
         values = [near.average(query, WIDE + sign * slopes * change, EQUAL) for sign in (1.0, -1.0)]
         for ours, up, down in zip(found[2:], *(moments[:2] for moments in values), strict=True):
             np.testing.assert_allclose(ours[:, 0, k], (up - down)[:, 0] / (2 * step), rtol=1e-3, atol=1e-7)
+
+
+def _by_numpy(near, query, points, weights):
+    """Return mean and variance (m,) of the average over points (s, d), as `neighbor_averages` says they are."""
+    evidence, own, m2 = near.evidence, near.hyperparameters, near.evidence.mean_variance
+    rows, counts, reach = near.nearest(query[None])
+    shares, around = near._neighborhoods.shares(query[None], points[None], reach), near._neighborhoods
+    anchors = shares.anchors[0][shares.anchors[0] >= 0]
+    trials = [rows[0, : counts[0]], *(around._rows[a, : around._counts[a]] for a in anchors)]
+    mean, variance = [], []
+    for j, scales in enumerate(near.length_scales):
+
+        def k(P, R, j=j, scales=scales):
+            shape = own.inverse_l[j, 2:]
+            return own.s2[j] * correlation(KERNELS[evidence.kernel], P, R, scales, *shape) + m2
+
+        A = k(evidence.X, evidence.X) + np.diag(evidence.noise + own.v[j] + evidence.ratio * own.s2[j])
+        W = np.zeros(len(evidence.X))
+        for group, members in enumerate(trials):
+            inside = shares.groups[0] == group
+            K = weights[inside] @ k(points[inside], evidence.X[members])
+            W[members] += np.linalg.solve(A[np.ix_(members, members)], K)
+        c = weights @ k(points, evidence.X)
+        mean.append(W @ near._Y[j])
+        variance.append(weights @ k(points, points) @ weights - 2.0 * W @ c + W @ A @ W)
+    outputs = near.outputs
+    return outputs.shift * weights.sum() + outputs.scale * np.array(mean), outputs.square * np.array(variance)
+
+
+@pytest.mark.parametrize("kernel", ["matern52", "matern52_two_scales"])
+def test_averages_over_several_neighborhoods_are_the_estimate_that_they_are_said_to_be(kernel):
+    """With a mean to be learnt, told noise beside learnt noise, offsets of each query's own, and weights of any sum."""
+    X, y = _trials(300)
+    rng = np.random.default_rng(7)
+    y = y + 0.1 * rng.standard_normal(300)
+    learning = Learning(particles=3, burn_in=2)
+    process = sh.GaussianProcess(kernel=kernel, noise="inferred", mean_variance=1.5, learning=learning)
+    exact = process.condition_on_all(X, y, np.random.default_rng(1))
+    evidence = exact.evidence._replace(noise=rng.uniform(0.001, 0.05, 300))
+    near = NeighborPosterior(evidence, exact.hyperparameters.theta, exact.outputs, 0)
+    offsets = rng.uniform(0.5, 1.0, (5, 1, 1)) * WIDE[:32]
+    weights, queries = rng.uniform(0.0, 0.05, 32), INSIDE[:5]
+    slopes = np.where(rng.random(offsets.shape) < 0.2, 0.0, 1.0)
+    found = near.average(queries, offsets, weights, gradient=True, slopes=slopes)
+    for i, query in enumerate(queries):
+        mean, variance = _by_numpy(near, query, query + offsets[i], weights)
+        np.testing.assert_allclose(found.mean[:, i], mean, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(found.variance[:, i], variance, rtol=1e-5, atol=1e-9)
+    step = 1e-6
+    for k in range(2):
+        change = step * slopes * np.eye(2)[k]
+        up, down = (near.average(queries, offsets + sign * change, weights) for sign in (1.0, -1.0))
+        for ours, above, below in zip(found[2:], up[:2], down[:2], strict=True):
+            np.testing.assert_allclose(ours[:, :, k], (above - below) / (2 * step), rtol=1e-3, atol=1e-6)
+    alone = near.average(queries[:1], 0.02 * offsets[0], weights, gradient=True, slopes=slopes[0])
+    narrow = near.average(queries, np.concatenate([offsets[1:], 0.02 * offsets[:1]])[[4, 0, 1, 2, 3]], weights)
+    np.testing.assert_allclose(narrow.mean[:, :1], alone.mean, rtol=1e-9)
 
 
 def test_what_was_averaged_before_changes_nothing(monkeypatch):

@@ -18,6 +18,7 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import (
 )
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, block_weights
+from surehold.optimization.surrogates.treed.partition import grow
 
 QUICK = Learning(particles=3, burn_in=2)
 
@@ -67,6 +68,24 @@ def test_each_leaf_is_a_process_of_its_own_trials():
             mean, std = oracle.predict(queries[home == j], return_std=True)
             assert moments.mean[0, home == j] == pytest.approx(mean, abs=1e-6)
             assert np.sqrt(moments.variance[0, home == j]) == pytest.approx(std, abs=1e-5)
+
+
+@pytest.mark.parametrize("power", [1.0, inf])
+def test_told_noise_stays_with_its_trials(power):
+    X, y = data()
+    told = np.random.default_rng(2).uniform(0.01, 0.5, len(y))
+    process = GaussianProcess(length_scales=[0.3, 0.7], signal_variance=2.0, standardize=False)
+    posterior = model(process=process, weight_power=power).fit(X, y, noise=told).posterior
+    queries = np.random.default_rng(1).random((50, 2))
+    moments, home = posterior.moments(queries), posterior.partition.route(queries)
+    for j in np.unique(home):
+        own = posterior.partition.nodes[posterior.partition.leaves[j]].members
+        oracle = GaussianProcessRegressor(2.0 * Matern([0.3, 0.7], nu=2.5), optimizer=None, alpha=told[own] ** 2)
+        mean, std = oracle.fit(X[own], y[own]).predict(queries[home == j], return_std=True)
+        assert moments.mean[0, home == j] == pytest.approx(mean, abs=1e-6)
+        assert np.sqrt(moments.variance[0, home == j]) == pytest.approx(std, abs=1e-6)
+        variance = posterior.noise_variance(queries[home == j])
+        assert variance == pytest.approx(np.full_like(variance, np.mean(told[own] ** 2)))
 
 
 @pytest.mark.parametrize("power", [1.0, 2.0, 3.0, inf])
@@ -396,6 +415,25 @@ def test_the_evidence_of_a_process_is_its_likelihood_less_what_was_fitted():
     flat = norm(0.0, 1.0).logpdf(np.log([0.3, 0.7]) - np.log(0.2 * np.sqrt(2.0))).sum()  # the prior's own density
     value = process.log_evidence(X, y, process.standardization(y))
     assert value == pytest.approx(oracle.log_marginal_likelihood_value_ + flat, rel=1e-6)
+
+
+def test_the_evidence_of_a_tree_is_that_of_its_leaves_each_trial_counted_once():
+    X, y = data(60)
+    told = np.random.default_rng(2).uniform(0.01, 0.5, len(y))
+    process = GaussianProcess(length_scales=[0.3, 0.7], signal_variance=2.0)
+    tree = model(process=process, min_leaf="evidence")
+    partition, outputs = grow(X, y, 8, np.zeros(2)), process.standardization(y).coarse()
+    home = partition.route(X)
+    flat = norm(0.0, 1.0).logpdf(np.log([0.3, 0.7]) - np.log(0.2 * np.sqrt(2.0))).sum()  # as above
+    expected = 0.0
+    for j in range(len(partition.leaves)):
+        own = home == j
+        oracle = GaussianProcessRegressor(
+            2.0 * Matern([0.3, 0.7], nu=2.5), optimizer=None, alpha=(told[own] / outputs.scale) ** 2
+        ).fit(X[own], (y[own] - y[own].mean()) / outputs.scale)
+        expected += oracle.log_marginal_likelihood_value_ + flat
+    assert len(partition.leaves) > 2
+    assert tree._log_evidence(partition, X, y, told, outputs) == pytest.approx(expected, rel=1e-6)
 
 
 def largest_jumps(posterior):

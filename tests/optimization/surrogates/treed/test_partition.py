@@ -37,6 +37,28 @@ def test_gain_is_scikit_learns_impurity_decrease(seed, rounded):
 
 
 @pytest.mark.parametrize("seed", range(3))
+def test_weights_count_trials_so_many_times(seed):
+    """The uncertainty of a node with weights is scikit-learn's of samples with them."""
+    X, y = data(seed)
+    weights = np.random.default_rng(seed + 10).exponential(size=40)
+
+    def uncertainty(own):
+        tree = DecisionTreeRegressor(max_depth=1).fit(X[own], y[own], sample_weight=weights[own]).tree_
+        return weights[own].sum() * tree.impurity[0]
+
+    best, place = -np.inf, None
+    for i in range(2):
+        for tau in X[:, i]:
+            low, high = X[:, i] <= tau, X[:, i] >= tau
+            if min(low.sum(), high.sum()) >= 5 and not (low.all() or high.all()):
+                gain = (uncertainty(low | high) - uncertainty(low) - uncertainty(high)) / weights.sum()
+                best, place = max((best, place), (gain, (i, tau)))
+    split = grow(X, y, 5, NO_MARGIN, weights).nodes[0].split
+    assert (split.dimension, split.threshold) == place
+    assert split.gain == pytest.approx(best, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_without_shared_trials_the_best_cut_is_scikit_learns(seed):
     # Each trial appears twice at almost the same place with the same output: what is shared weighs next to nothing.
     rng = np.random.default_rng(seed)
