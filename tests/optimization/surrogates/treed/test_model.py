@@ -7,6 +7,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import Matern
 
 import surehold as sh
+from surehold.defaults import LEAF_MARGIN, WIDEST_LEAF_MARGIN
 from surehold.errors import InputError
 from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.strategy.thesis import thesis_preset
@@ -17,7 +18,7 @@ from surehold.optimization.surrogates.gaussian_process.likelihood import (
     log_posterior_and_gradient,
 )
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
-from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, block_weights
+from surehold.optimization.surrogates.treed.model import TreedGaussianProcess, _nearest, block_weights, least_leaf_width
 from surehold.optimization.surrogates.treed.partition import grow
 
 QUICK = Learning(particles=3, burn_in=2)
@@ -240,6 +241,18 @@ def test_chains_continue_from_the_leaf_that_overlaps_most():
     assert not np.array_equal(one.leaves[0].length_scales, two.leaves[0].length_scales)
 
 
+def test_the_leaf_that_overlaps_most_has_the_largest_share_of_points():
+    X, _ = data(160)
+    y = np.sin(9.0 * X).sum(axis=1)
+    old, new = (model().fit(X[part], y[part]).posterior for part in (slice(0, 100), slice(60, 160)))
+    assert len(new.leaves) > 8
+    points = np.random.default_rng(0).random((40_000, 2))
+    homes = [posterior.partition.route(points) for posterior in (old, new)]
+    for j in range(len(new.leaves)):
+        counts = np.bincount(homes[0][homes[1] == j], minlength=len(old.leaves))
+        assert counts[_nearest(new.partition, j, old)] >= 0.9 * counts.max()
+
+
 def test_diagnostics_show_the_tree():
     X = np.linspace(0.0, 1.0, 41)[:, None]
     summary = model().fit(X, np.where(X[:, 0] > 0.5, 3.0, 0.0)).posterior.diagnostics.partition
@@ -326,6 +339,13 @@ def test_bad_data_are_named():
         model().fit(X, y, noise=[0.1])
     with pytest.raises(InputError, match="seed"):
         model().fit(X, y, seed=-1)
+
+
+def test_no_leaf_is_narrower_than_the_noise_and_none_is_refused_under_much():
+    margin = least_leaf_width(np.array([0.0, 0.001, 0.2, 3.0]))
+    assert margin == pytest.approx([LEAF_MARGIN, 0.001, 0.2, WIDEST_LEAF_MARGIN])
+    X, y = data()
+    assert np.all(np.isfinite(model(margin=margin[2:]).fit(X, y).predict(X)))
 
 
 BOX = sh.Box({"a": (0.0, 1.0), "b": (0.0, 1.0)})
