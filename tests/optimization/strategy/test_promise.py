@@ -62,6 +62,16 @@ def test_of_a_risk_measure(finer, posterior):
     assert 0.999 * expected <= found < 1.1 * expected, "between two points of the grid there is little more"
 
 
+def test_of_a_risk_measure_it_is_the_corrected_one(posterior):
+    """Four perturbations promise half as much again as there is."""
+    few, many = (Perturbations(quasi_monte_carlo(4.0 * S, exponent)) for exponent in (2, 9))
+    ranking = Ranking(few, Perturbations(sigma_points(4.0 * S)), Risk("cvar"), False, finer=many)
+    measure = RiskImprovement(posterior, few, Risk("cvar"), None, np.random.default_rng(0))
+    corrected, plain = (measure.corrected(finer).over(TRIED)(GRID).max() for finer in (many, None))
+    assert plain > 1.4 * corrected
+    assert promise(ranking, posterior, HISTORY, np.random.default_rng(0)) == pytest.approx(corrected, rel=1e-2)
+
+
 class Often:
     """Something that holds with the probability 0.3, wherever."""
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from scipy.stats import multivariate_normal, norm
+from scipy.stats import lognorm, multivariate_normal, norm
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
@@ -119,6 +119,22 @@ def test_heteroscedastic_noise_predicts_better_than_one_common_level():
         plain, local = (GaussianProcess(noise=name).fit(X, y) for name in ("inferred", "heteroscedastic"))
         gains.append(loss(plain) - loss(local))
     assert min(gains) > 0.1
+
+
+def test_of_noise_that_varies_each_particle_takes_another_quantile():
+    """Pending trials and thinning leave that as it is; pending trials are as noisy as their place."""
+    posterior = GaussianProcess(noise="heteroscedastic").fit(*noisy_data(100, 0), 0).posterior
+    Q, m = np.linspace(0.0, 1.0, 5)[:, None], len(posterior.length_scales)
+    level = posterior.log_noise.moments(Q)
+    shares = (np.arange(m)[:, None] + 0.5) / m
+    expected = lognorm.ppf(shares, np.sqrt(level.variance[0]), scale=np.exp(level.mean[0]))
+    waiting = posterior.with_pending(Q)
+    for any_one in (posterior, waiting):
+        np.testing.assert_allclose(any_one.noise_variance(Q), posterior.outputs.square * expected, rtol=1e-9)
+    np.testing.assert_allclose(waiting.evidence.noise[-5:], np.exp(level.mean[0]))
+    one = posterior.thinned(1, 3)
+    np.testing.assert_array_equal(one.length_scales, posterior.length_scales[[3]])
+    np.testing.assert_allclose(one.noise_variance(Q)[0], posterior.outputs.square * np.exp(level.mean[0]))
 
 
 def test_common_noise_is_not_taken_for_a_pattern():

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern
 
@@ -10,6 +11,7 @@ from surehold.optimization.noise.quadratures import sigma_points
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, Prior
 from surehold.optimization.surrogates.gaussian_process.kernels import KERNELS, correlation
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
+from surehold.optimization.surrogates.gaussian_process.posterior import surprise
 from surehold.optimization.surrogates.protocol import means, mixture
 from surehold.optimization.surrogates.treed.model import TreedGaussianProcess
 
@@ -231,6 +233,14 @@ def test_a_thinned_posterior_is_that_of_its_particles(data, learnt):
         np.testing.assert_array_equal(one, whole[::3])
 
 
+def test_a_thinned_posterior_keeps_what_its_particles_believe_of_pending_trials(data, learnt):
+    waiting = learnt.with_pending(data[2][:2])
+    some = waiting.thinned(3, 1)
+    np.testing.assert_array_equal(some.hyperparameters.theta, waiting.hyperparameters.theta[1::3])
+    for one, whole in zip(some.left_out()[:2], waiting.left_out()[:2], strict=True):
+        np.testing.assert_array_equal(one, whole[1::3])
+
+
 def test_hyperparameters_are_learnt_from_the_first_trials_until_later_ones_contradict():
     rng = np.random.default_rng(11)
     X = rng.random((71, 1))
@@ -254,6 +264,27 @@ def test_surprise_counts_standard_deviations(data):
     after = GaussianProcess(**fixed).fit(X, y).posterior
     expected = abs(y[-1] - before.mean[0, 0]) / np.sqrt(before.variance[0, 0] + 0.01)
     assert after.surprise(len(y) - 1) == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(("spread", "few"), [(0.1, False), (2.0, False), (3.0, True), (6.0, True)])
+def test_what_few_particles_explain_is_a_surprise(spread, few):
+    """The particles weighed by the density of the later trials given the first ones, by SciPy."""
+    rng, n, k, m = np.random.default_rng(5), 6, 4, 12
+    roots = rng.standard_normal((m, n, n))
+    A = roots @ roots.transpose(0, 2, 1) + np.exp(spread * rng.standard_normal(m))[:, None, None] * np.eye(n)
+    y = rng.standard_normal(n)
+    found = surprise(np.array([np.linalg.inv(np.linalg.cholesky(a)) for a in A]), np.tile(y, (m, 1)), k)
+    logs, misses = np.empty(m), np.empty((m, n - k))
+    for j, a in enumerate(A):
+        parts = (multivariate_normal(np.zeros(c), a[:c, :c]).logpdf(y[:c]) for c in (n, k))
+        logs[j] = next(parts) - next(parts)
+        for i in range(k, n):
+            gain = np.linalg.solve(a[:i, :i], a[:i, i])
+            misses[j, i - k] = abs(y[i] - gain @ y[:i]) / np.sqrt(a[i, i] - gain @ a[:i, i])
+    weights = np.exp(logs - logs.max())
+    effective = weights.sum() ** 2 / np.square(weights).sum()
+    assert (effective < 0.25 * m) == few
+    assert found == (np.inf if few else pytest.approx(misses.min(axis=0).max()))
 
 
 def test_learns_the_length_scales_of_a_known_process():

@@ -65,6 +65,29 @@ def test_with_fewer_trials_than_neighbors_nothing_is_left_out(gradient, kernel):
     assert near.thinned(3).moments(queries).mean.shape == exact.thinned(3).moments(queries).mean.shape
 
 
+def test_noise_pending_trials_and_particles_are_those_of_the_model_that_leaves_nothing_out():
+    X, y = _trials(NEIGHBORS[0] - 2)
+    rng = np.random.default_rng(6)
+    process = sh.GaussianProcess(noise="inferred", learning=Learning(particles=6, burn_in=2))
+    exact = process.fit(X, y + 0.1 * rng.standard_normal(len(y))).posterior
+    exact = GaussianProcessPosterior(
+        exact.evidence._replace(noise=rng.uniform(0.001, 0.05, len(y))), exact.hyperparameters.theta, exact.outputs, 0
+    )
+    near = NeighborPosterior(exact.evidence, exact.hyperparameters.theta, exact.outputs, 0)
+    queries, pending = rng.random((5, 2)), rng.random((2, 2))
+    np.testing.assert_allclose(near.noise_variance(queries), exact.noise_variance(queries), rtol=1e-12)
+    weights = 2.0 * WEIGHTS
+    for ours, theirs in (
+        (near, exact),
+        (near.thinned(2, 1), exact.thinned(2, 1)),
+        (near.with_pending(pending), exact.with_pending(pending)),
+        (near.with_pending(pending).thinned(2, 1), exact.with_pending(pending).thinned(2, 1)),
+    ):
+        pairs = zip(ours.average(queries, OFFSETS, weights), theirs.average(queries, OFFSETS, weights), strict=True)
+        for one, other in list(pairs)[:2]:
+            np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
+
+
 @pytest.mark.parametrize("noise", [None, 0.1])
 def test_the_nearest_trials_tell_nearly_what_all_do(noise):
     exact, near = _both(300, noise=noise)
