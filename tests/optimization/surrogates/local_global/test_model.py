@@ -52,6 +52,44 @@ def test_moments_by_textbook_algebra(posterior):
             assert found.variance[j, i] == pytest.approx(posterior._outputs.square * variance, abs=1e-6)
 
 
+def test_a_trial_left_out_is_predicted_from_the_others(posterior):
+    found, outputs = posterior.left_out(), posterior._outputs
+    for j, particle in enumerate(posterior._particles):
+        A = covariance(X, X, particle) + 1e-10 * particle.s2 * np.eye(len(X))
+        for i in range(len(X)):
+            rest = np.arange(len(X)) != i
+            gain = np.linalg.solve(A[np.ix_(rest, rest)], A[rest, i])
+            mean, variance = gain @ outputs.apply(Y[rest]), A[i, i] - gain @ A[rest, i]
+            assert found.mean[j, i] == pytest.approx(outputs.shift + outputs.scale * mean, abs=1e-5)
+            assert found.variance[j, i] == pytest.approx(outputs.scale**2 * variance, rel=1e-4, abs=1e-8)
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_weights_need_not_sum_to_one(many, posterior):
+    offsets, weights = sigma_points(0.003 * np.eye(2)) if many else (np.zeros((1, 2)), np.ones(1))
+    once, thrice = (posterior.average(Q, offsets, factor * weights, gradient=True) for factor in (1.0, 3.0))
+    for one, other, factor in zip(once, thrice, (3.0, 9.0, 3.0, 9.0), strict=True):
+        np.testing.assert_allclose(other, factor * one, rtol=1e-6, atol=1e-9)
+
+
+def test_a_thinned_posterior_is_that_of_its_particles(posterior):
+    whole, some = posterior.moments(Q), posterior.thinned(3, 1).moments(Q)
+    for one, all_ in zip(some[:2], whole[:2], strict=True):
+        np.testing.assert_array_equal(one, all_[1::3])
+
+
+def test_hyperparameters_are_learnt_anew_where_later_trials_contradict():
+    places = np.random.default_rng(5).random((33, 2))
+    values = np.sin(4.0 * places[:, 0]) + places[:, 1]
+    before, after, contradicted = (
+        LocalGlobalProcess().condition(places[:n], values[:n] + shift, np.random.default_rng(0))._particles
+        for n, shift in ((32, 0.0), (33, 0.0), (33, np.eye(33)[32] * 5.0))
+    )
+    scales = [np.array([particle.inverse_l for particle in some]) for some in (before, after, contradicted)]
+    np.testing.assert_array_equal(scales[1], scales[0])
+    assert not np.array_equal(scales[2], scales[0])
+
+
 def test_density_of_the_hyperparameters(posterior):
     particle = posterior._particles[0]
     theta = np.concatenate([-np.log(particle.inverse_l).ravel(), [np.log(particle.s2)], particle.center])
@@ -62,8 +100,9 @@ def test_density_of_the_hyperparameters(posterior):
     expected -= 0.5 * np.square(theta[:5] / 2.0).sum()
     assert log_posterior(theta, extended) == pytest.approx(expected, rel=1e-6)
     outside = theta.copy()
-    outside[-1] = 1.2
-    assert log_posterior(outside, extended) == -np.inf
+    for coordinate in (1.2, -0.2):
+        outside[-1] = coordinate
+        assert log_posterior(outside, extended) == -np.inf
 
 
 @pytest.mark.parametrize("many", [False, True])
