@@ -9,7 +9,10 @@ from surehold.errors import InputError
 from surehold.optimization.box import Box
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
-from surehold.optimization.surrogates.gaussian_process.heteroscedastic import log_evidence_of_a_constant
+from surehold.optimization.surrogates.gaussian_process.heteroscedastic import (
+    log_evidence_of_a_constant,
+    with_learnt_noise,
+)
 from surehold.optimization.surrogates.gaussian_process.hyperparameters import Learning, mode
 from surehold.optimization.surrogates.gaussian_process.likelihood import log_posterior
 from surehold.optimization.surrogates.gaussian_process.model import GaussianProcess
@@ -119,6 +122,25 @@ def test_heteroscedastic_noise_predicts_better_than_one_common_level():
         plain, local = (GaussianProcess(noise=name).fit(X, y) for name in ("inferred", "heteroscedastic"))
         gains.append(loss(plain) - loss(local))
     assert min(gains) > 0.1
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_noise_that_varies_explains_the_squared_errors_that_are_left_with_it(seed):
+    """Where the alternation ends, what is learnt of is g + s / r - 1, at most 2 above g, with s given the noise r."""
+    common = GaussianProcess(noise="inferred").fit(*noisy_data(100, seed)).posterior.evidence
+    evidence, levels = with_learnt_noise(common)
+    X, y, r = evidence.X, evidence.y, evidence.noise
+    theta, _ = mode(evidence)
+    scales, s2 = np.exp(theta[:1]), np.exp(theta[1])
+    process = GaussianProcessRegressor(ConstantKernel(s2) * Matern(scales, nu=2.5), alpha=r, optimizer=None)
+    mean, std = process.fit(X, y).predict(X, return_std=True)
+    expected = np.log(r) + np.minimum(((y - mean) ** 2 + std**2) / r - 1.0, 2.0)
+    np.testing.assert_allclose(levels.evidence.y + levels.outputs.shift, expected, atol=0.05)
+    g = levels.evidence.y + levels.outputs.shift
+    theta = levels.hyperparameters.theta[0]
+    A = np.exp(theta[1]) * Matern(np.exp(theta[:1]), nu=2.5)(X)
+    smoothed = g.mean() + (A + 25.0) @ np.linalg.solve(A + 25.0 + 2.0 * np.eye(100), g - g.mean())
+    np.testing.assert_allclose(np.log(r), smoothed, atol=0.01)
 
 
 def test_of_noise_that_varies_each_particle_takes_another_quantile():
