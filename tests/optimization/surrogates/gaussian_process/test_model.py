@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import multivariate_normal
+from scipy.stats import kstest, multivariate_normal, norm
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern
 
@@ -285,6 +285,15 @@ def test_what_few_particles_explain_is_a_surprise(spread, few):
     effective = weights.sum() ** 2 / np.square(weights).sum()
     assert (effective < 0.25 * m) == few
     assert found == (np.inf if few else pytest.approx(misses.min(axis=0).max()))
+
+
+def test_equal_outputs_leave_the_prior():
+    X = np.random.default_rng(0).random((12, 2))
+    learning, prior = Learning(particles=4000), Prior((-1.0, 0.5), (0.7, 2.0), (-3.0, 1.5))
+    posterior = GaussianProcess(prior=prior, learning=learning, noise="inferred").fit(X, np.ones(12)).posterior
+    theta = posterior.hyperparameters.theta
+    for column, (mean, deviation) in zip(theta.T, [(-1.0, 0.5)] * 2 + [(0.7, 2.0), (-3.0, 1.5)], strict=True):
+        assert kstest(column, norm(mean, deviation).cdf).pvalue > 0.01
 
 
 def test_learns_the_length_scales_of_a_known_process():

@@ -72,6 +72,23 @@ def test_weights_need_not_sum_to_one(many, posterior):
         np.testing.assert_allclose(other, factor * one, rtol=1e-6, atol=1e-9)
 
 
+def test_gradient_where_points_are_held_at_the_border(posterior):
+    offsets, weights = sigma_points(0.003 * np.eye(2))
+    U, h = np.array([[0.02, 0.5], [0.97, 0.99]]), 1e-6
+
+    def held(V):
+        return np.clip(V[:, None, :] + offsets, 0.0, 1.0) - V[:, None, :]
+
+    inside = (U[:, None, :] + offsets > 0.0) & (U[:, None, :] + offsets < 1.0)
+    assert not inside.all()
+    found = posterior.average(U, held(U), weights, True, inside.astype(float))
+    for k in range(2):
+        up, down = (posterior.average(V, held(V), weights) for V in (U + h * np.eye(2)[k], U - h * np.eye(2)[k]))
+        np.testing.assert_allclose(found.mean_gradient[..., k], (up.mean - down.mean) / (2 * h), rtol=1e-4, atol=1e-4)
+        slope = (up.variance - down.variance) / (2 * h)
+        np.testing.assert_allclose(found.variance_gradient[..., k], slope, rtol=1e-3, atol=1e-4)
+
+
 def test_a_thinned_posterior_is_that_of_its_particles(posterior):
     whole, some = posterior.moments(Q), posterior.thinned(3, 1).moments(Q)
     for one, all_ in zip(some[:2], whole[:2], strict=True):
