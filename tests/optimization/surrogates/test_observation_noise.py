@@ -212,6 +212,7 @@ def test_a_chain_begins_anew_where_noise_is_found_to_vary_and_where_it_is_not():
     for n in (5, 200, 5):
         posterior = model.condition(*noisy_data(n, 1), rng, posterior)
         known.append(posterior.log_noise is not None)
+        assert posterior.hyperparameters.theta.shape[1] == (2 if known[-1] else 3)
         assert np.isfinite(posterior.moments(np.array([[0.3]])).mean).all()
     assert known == [False, True, False]
 
