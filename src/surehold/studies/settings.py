@@ -16,6 +16,7 @@ from surehold.errors import InputError, unknown_name
 from surehold.optimization.acquisition.risk_measures import Risk
 from surehold.optimization.noise.input_noise import InputNoise
 from surehold.optimization.optimizer import Optimizer
+from surehold.problems.grasp.options import checked_words
 from surehold.studies.sampler import Sampler
 from surehold.studies.search_space import SearchSpace
 
@@ -125,6 +126,9 @@ class StudySettings:
         for part, name in (("parameters", "parameter"), ("units", "unit of"), ("optimizer", ""), ("problem", "")):
             for key in mine[part] | theirs[part]:
                 ours, asked = (side[part].get(key) for side in (mine, theirs))
+                if key == "grasp" and ours and asked:
+                    # Options that an earlier version did not know are at their defaults.
+                    ours, asked = checked_words(ours), checked_words(asked)
                 if part == "problem" and isinstance(ours, dict) and isinstance(asked, dict):
                     differing = [k for k in ours | asked if not _same(ours.get(k), asked.get(k))]
                     ours, asked = ({k: side.get(k) for k in differing} for side in (ours, asked))
