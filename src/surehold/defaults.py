@@ -253,9 +253,12 @@ SURPRISE: Final = 4.0
 #: and 0.53 +- 0.31 decades); in 3 variables under noise both stay below 1e-3: python -m benchmarks.switch
 MANY: Final = 800
 MANY_LEARNT: Final = 200
-#: Trials that a query is then answered from: the nearest of all, of every eighth, of every 64th.
-#: python -m benchmarks.growth
+#: Trials that a query is then answered from: the nearest of all, of every eighth, of every 64th. So many in up to ten
+#: variables; d / 10 times as many in more, which have more slopes to learn, up to three times.
+#: python -m benchmarks.growth; python -m benchmarks.neighbors
 NEIGHBORS: Final = (36, 12, 8)
+NEIGHBORS_VARIABLES: Final = 10
+MOST_TIMES_NEIGHBORS: Final = 3.0
 #: Of an average, a point is answered from the trials near the query where it lies within this fraction of the distance
 #: of the farthest one of the nearest; the others share neighborhoods of their own, a quarter as many as there are
 #: points, from the fewest to the most. Time: python -m benchmarks.growth.

@@ -112,19 +112,23 @@ def test_trials_whose_covariance_cannot_be_factorized_give_neither_moments_nor_d
             ask()
 
 
-def test_the_nearest_of_every_set_are_found():
-    _, near = _both(300)
-    queries = np.random.default_rng(5).random((9, 2))
+@pytest.mark.parametrize(("d", "times"), [(2, 1.0), (10, 1.0), (15, 1.5), (40, 3.0)])
+def test_the_nearest_of_every_set_are_found(d, times):
+    X = np.random.default_rng(4).random((300, d))
+    exact = sh.GaussianProcess().condition(X, X.sum(axis=1), np.random.default_rng(1))
+    theta = exact.hyperparameters.theta
+    near = NeighborPosterior(exact.evidence, theta, exact.outputs, 0)
+    queries = np.random.default_rng(5).random((9, d))
     rows, counts, reach = near.nearest(queries)
-    scale = np.exp(-near.hyperparameters.theta[:, :2].mean(axis=0))
+    scale = np.exp(-theta[:, :d].mean(axis=0))
     distances = cdist(queries * scale, near.evidence.X * scale)
     for i in range(9):
         wanted = set()
         for level, count in enumerate(NEIGHBORS):
             part = np.arange(300)[:: 8**level]
-            wanted |= set(part[np.argsort(distances[i, part])[:count]].tolist())
+            wanted |= set(part[np.argsort(distances[i, part])[: round(times * count)]].tolist())
         assert set(rows[i, : counts[i]].tolist()) == wanted
-        np.testing.assert_allclose(reach[i], np.sort(distances[i])[NEIGHBORS[0] - 1])
+        np.testing.assert_allclose(reach[i], np.sort(distances[i])[round(times * NEIGHBORS[0]) - 1])
 
 
 def test_gradients_are_those_of_the_values_where_the_neighbors_stay():

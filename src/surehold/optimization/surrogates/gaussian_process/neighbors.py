@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from surehold.defaults import NEIGHBORS, WITHIN_REACH
+from surehold.defaults import MOST_TIMES_NEIGHBORS, NEIGHBORS, NEIGHBORS_VARIABLES, WITHIN_REACH
 from surehold.errors import SureholdError
 from surehold.optimization.surrogates.gaussian_process.likelihood import Evidence
 from surehold.optimization.surrogates.gaussian_process.neighbor_averages import (
@@ -59,6 +59,8 @@ class NeighborPosterior:
         self._scale: Final = np.exp(-theta[:, :d].mean(axis=0))
         parts = [np.arange(n)[:: _COARSER**level] for level in range(3)]
         self._trees: Final = [(part, KDTree(evidence.X[part] * self._scale)) for part in parts]
+        times = min(max(d / NEIGHBORS_VARIABLES, 1.0), MOST_TIMES_NEIGHBORS)
+        self._counts: Final = [round(times * count) for count in NEIGHBORS]
         self.diagnostics: Final = FitDiagnostics(n, cost, 0, outputs.flat)
         self.regions: Final = Regions.whole(d, self.hyperparameters.separable)
 
@@ -69,7 +71,7 @@ class NeighborPosterior:
         that are the nearest of all trials.
         """
         found, reach = [], np.empty(0)
-        for (part, tree), count in zip(self._trees, NEIGHBORS, strict=True):
+        for (part, tree), count in zip(self._trees, self._counts, strict=True):
             distances, rows = tree.query(queries * self._scale, k=np.arange(1, min(count, len(part)) + 1))  # pyright: ignore[reportArgumentType]
             reach = reach if found else distances[:, -1]
             found.append(part[rows])
@@ -167,7 +169,7 @@ class NeighborPosterior:
         m, (q, s, _) = len(self._Y), points.shape
         draws = np.empty((m, q, *normals.shape))
         for i in range(q):
-            rows = np.unique(self.nearest(points[i])[0][:, :: max(1, s * sum(NEIGHBORS) // _SAMPLED)])
+            rows = np.unique(self.nearest(points[i])[0][:, :: max(1, s * sum(self._counts) // _SAMPLED)])
             X, Y, noise = self.evidence.X[rows], np.ascontiguousarray(self._Y[:, rows]), self.evidence.noise[rows]
             inverse_L, alpha = np.empty((m, len(rows), len(rows))), np.empty((m, len(rows)))
             own = self.hyperparameters
