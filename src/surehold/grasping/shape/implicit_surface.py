@@ -158,8 +158,8 @@ def learnt_scales(prior: PriorShape, observations: Observations) -> Scales:
 
     Priors are log-normal: the standard deviation about a fifth of the shape's mean half extent, the length scale about
     all of it, each within a factor of 1.6 (one standard deviation). The noise stays within a thousandth of what is
-    given: its logarithm begins at 0, and the first steps of Nelder-Mead are in proportion. Let free it falls, to about
-    a tenth for points of 1 mm, since scattered zeros alone are explained best by a function without slope.
+    given: its logarithm begins at 0, and the first steps of Nelder-Mead are in proportion. Let free it falls, since
+    scattered zeros alone are explained best by a function without slope.
     """
     from scipy.linalg import cho_solve
     from scipy.optimize import minimize

@@ -167,7 +167,7 @@ def _check_unit(points: Array) -> None:
 
 
 def _check_outward(points: Array, normals: Array) -> None:
-    """Refuse normals that point inwards: a ball was learnt as one of half the size more.
+    """Refuse normals that point inwards: the inside would be learnt as the outside, and a larger object.
 
     By the divergence theorem the mean of normal . point is three volumes by the area of a closed surface. A hollow that
     is seen from its opening looks the same; there the camera tells.

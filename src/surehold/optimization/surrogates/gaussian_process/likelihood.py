@@ -208,7 +208,7 @@ def _add_slopes_by_shape(X, Z, scales, starts, weights, C, room, gradient):
     These are flat triangles, as `room` is, which is overwritten.
     """
     n, d = X.shape
-    room[:] = 0.0
+    room[:] = 0.0  # squared distances; products are not fused, whose last bits send chains of hyperparameters elsewhere
     for i in range(n):
         for k in range(d):
             for j in range(i):
